@@ -1,0 +1,1 @@
+"""Simulation and identification of the ride model; knows nothing of the web."""

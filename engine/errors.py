@@ -1,0 +1,74 @@
+"""Every error a caller can mend, each with a stable code and one sentence for a person.
+
+A message names the place (file, line, field, channel), says what is wrong there, and what to do.
+How a numerical method ended is not an error: a poor fit is a result.
+"""
+
+
+class RideError(Exception):
+    """An input or a request that the caller can mend; `str(error)` is the sentence to show."""
+
+    code = "ride"
+
+
+class VehicleError(RideError):
+    """A vehicle's data is missing, misspelt or physically impossible."""
+
+    code = "vehicle"
+
+
+class ParameterError(RideError):
+    """An unknown parameter name or a value outside its range."""
+
+    code = "parameter"
+
+
+class MeasurementError(RideError):
+    """A measurement file or one of its channels cannot be used."""
+
+    code = "measurement"
+
+
+class RoadError(RideError):
+    """A road profile or its description cannot be used."""
+
+    code = "road"
+
+
+class ManoeuvreError(RideError):
+    """A manoeuvre's description cannot be used."""
+
+    code = "manoeuvre"
+
+
+class SimulationError(RideError):
+    """A simulation cannot be set up as asked."""
+
+    code = "simulation"
+
+
+class SimulationDiverged(SimulationError):
+    """A simulation left the range where the model means anything.
+
+    time : when, s
+    coordinate : which generalized coordinate, by its channel name
+    """
+
+    code = "simulation-diverged"
+
+    def __init__(self, time: float, coordinate: str, remedy: str):
+        super().__init__(f"The simulation diverged at t = {time:.3f} s in {coordinate}; {remedy}")
+        self.time = time
+        self.coordinate = coordinate
+
+
+class ProblemError(RideError):
+    """An identification cannot be set up: runs, free parameters or bounds do not fit together."""
+
+    code = "identification"
+
+
+class Cancelled(RideError):
+    """The caller asked for the work to stop."""
+
+    code = "cancelled"

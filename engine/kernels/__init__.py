@@ -1,0 +1,1 @@
+"""Compiled equations of motion, written once for any number of cars."""
