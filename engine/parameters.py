@@ -1,0 +1,171 @@
+"""The twelve parameters an identification can free, in the order of the paper's Table 3.
+
+One row a parameter: its path in the vehicle's JSON, its symbol and label, how a page shows it and
+how far a slider goes. Bounds of a fit, sliders, JSON and documentation all read this table.
+"""
+
+import math
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+from .errors import ParameterError
+from .frames import AxleName
+
+SHARE_OF_START = (0.05, 8.0)
+"""Default bounds of a stiffness or damping, as multiples of its start value."""
+
+ANGLE_BOUNDS = (-0.3, 1.3)
+"""Default bounds of a pivot angle, rad."""
+
+DISTANCE_BOUNDS = (0.1, 10.0)
+"""Default bounds of a pivot distance's magnitude, m; its sign is that of the start value."""
+
+PER_DEGREE = math.pi / 180.0
+"""Factor from a quantity per radian to one per degree."""
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One parameter; slider limits, step and `unit` are SI, `display = SI * display_factor`."""
+
+    name: str
+    symbol: str
+    label: str
+    unit: str
+    display_unit: str
+    display_factor: float
+    slider_lower: float
+    slider_upper: float
+    step: float
+
+
+def _spring(axle: AxleName) -> Parameter:
+    return Parameter(
+        name=f"{axle}.suspension.stiffness",
+        symbol=f"K_{axle[0].upper()}",
+        label=f"{axle.capitalize()} spring stiffness",
+        unit="N/m",
+        display_unit="N/mm",
+        display_factor=1e-3,
+        slider_lower=5e3,
+        slider_upper=1e5,
+        step=100.0,
+    )
+
+
+def _damper(axle: AxleName) -> Parameter:
+    return Parameter(
+        name=f"{axle}.suspension.damping",
+        symbol=f"C_{axle[0].upper()}",
+        label=f"{axle.capitalize()} damping",
+        unit="N s/m",
+        display_unit="N s/m",
+        display_factor=1.0,
+        slider_lower=100.0,
+        slider_upper=1e4,
+        step=10.0,
+    )
+
+
+def _bar_stiffness(axle: AxleName) -> Parameter:
+    return Parameter(
+        name=f"{axle}.stabilizer_bar.stiffness",
+        symbol=f"Ktor_{axle[0].upper()}",
+        label=f"{axle.capitalize()} stabilizer bar stiffness",
+        unit="N m/rad",
+        display_unit="N m/deg",
+        display_factor=PER_DEGREE,
+        slider_lower=0.0,
+        slider_upper=2000.0 / PER_DEGREE,
+        step=1.0 / PER_DEGREE,
+    )
+
+
+def _bar_damping(axle: AxleName) -> Parameter:
+    return Parameter(
+        name=f"{axle}.stabilizer_bar.damping",
+        symbol=f"Ctor_{axle[0].upper()}",
+        label=f"{axle.capitalize()} stabilizer bar damping",
+        unit="N m s/rad",
+        display_unit="N m s/deg",
+        display_factor=PER_DEGREE,
+        slider_lower=0.0,
+        slider_upper=30.0 / PER_DEGREE,
+        step=0.05 / PER_DEGREE,
+    )
+
+
+def _pivot_distance(axle: AxleName) -> Parameter:
+    return Parameter(
+        name=f"{axle}.pivot.distance",
+        symbol=f"d_{axle[0].upper()}",
+        label=f"{axle.capitalize()} pivot distance",
+        unit="m",
+        display_unit="m",
+        display_factor=1.0,
+        slider_lower=0.2,
+        slider_upper=6.0,
+        step=0.01,
+    )
+
+
+def _pivot_angle(axle: AxleName) -> Parameter:
+    return Parameter(
+        name=f"{axle}.pivot.angle",
+        symbol=f"phi_{axle[0].upper()}",
+        label=f"{axle.capitalize()} pivot angle",
+        unit="rad",
+        display_unit="deg",
+        display_factor=1.0 / PER_DEGREE,
+        slider_lower=-15.0 * PER_DEGREE,
+        slider_upper=60.0 * PER_DEGREE,
+        step=0.1 * PER_DEGREE,
+    )
+
+
+PARAMETERS: tuple[Parameter, ...] = (
+    _spring("front"),
+    _damper("front"),
+    _spring("rear"),
+    _damper("rear"),
+    _bar_stiffness("front"),
+    _bar_damping("front"),
+    _bar_stiffness("rear"),
+    _bar_damping("rear"),
+    _pivot_distance("front"),
+    _pivot_angle("front"),
+    _pivot_distance("rear"),
+    _pivot_angle("rear"),
+)
+
+PARAMETER_NAMES: tuple[str, ...] = tuple(row.name for row in PARAMETERS)
+
+
+def parameter(name: str) -> Parameter:
+    """The row of the parameter with this name or symbol."""
+    for row in PARAMETERS:
+        if name in (row.name, row.symbol):
+            return row
+    near = get_close_matches(name, (*PARAMETER_NAMES, *(row.symbol for row in PARAMETERS)), n=1)
+    hint = f"did you mean {near[0]}?" if near else f"the twelve are {', '.join(PARAMETER_NAMES)}."
+    raise ParameterError(f"No parameter is called {name!r}; {hint}")
+
+
+def default_bounds(name: str, start: float) -> tuple[float, float]:
+    """Lower and upper bound of a free parameter that starts at `start`.
+
+    Stiffness and damping: 0.05 to 8 times the start, which must be positive. Pivot angle: -0.3 to
+    1.3 rad. Pivot distance: 0.1 to 10 m with the sign of the start.
+    """
+    row = parameter(name)
+    if row.name.endswith("pivot.angle"):
+        return ANGLE_BOUNDS
+    lower, upper = DISTANCE_BOUNDS
+    if row.name.endswith("pivot.distance"):
+        return (lower, upper) if start > 0.0 else (-upper, -lower)
+    if not start > 0.0:
+        raise ParameterError(
+            f"{row.name} starts at {start:g} {row.unit}, from which no default bounds follow; give"
+            " it a positive start value, give its bounds, or fix it."
+        )
+    return SHARE_OF_START[0] * start, SHARE_OF_START[1] * start
