@@ -1,0 +1,330 @@
+"""The table of channels: name, unit and sign of every time history, wherever it appears.
+
+Simulation output, measurement files, charts, REST and the command line use these names. A row
+with `{corner}` or `{axle}` stands for four or two channels; accelerations at chassis points such
+as `seat.driver.a_z` follow a pattern, since the points are the user's own.
+"""
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from difflib import SequenceMatcher
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import MeasurementError
+from .frames import AXLES, CORNERS
+
+_MILLI = ("mm", 1e3)
+_DEGREE = ("deg", 180.0 / math.pi)
+_KILO = ("kN", 1e-3)
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelInfo:
+    """What a channel is: SI unit, how a page shows it (display = SI * factor), sign.
+
+    largest, smallest : magnitudes in SI between which the greatest value of a real recording
+        lies; outside them the unit in the file is doubtful. 0 and infinity where none is known.
+    """
+
+    name: str
+    unit: str
+    quantity: str
+    label: str
+    sign: str
+    display_unit: str
+    display_factor: float
+    largest: float = math.inf
+    smallest: float = 0.0
+
+
+def _row(
+    name: str,
+    unit: str,
+    quantity: str,
+    label: str,
+    sign: str,
+    display: tuple[str, float] | None = None,
+    *,
+    largest: float = math.inf,
+    smallest: float = 0.0,
+) -> ChannelInfo:
+    shown, factor = display or (unit, 1.0)
+    return ChannelInfo(name, unit, quantity, label, sign, shown, factor, largest, smallest)
+
+
+CHANNEL_KINDS: tuple[ChannelInfo, ...] = (
+    _row("time", "s", "time", "Time", "strictly increasing"),
+    _row(
+        "chassis.z",
+        "m",
+        "displacement",
+        "Chassis vertical displacement",
+        "of the sprung mass's CG from rest, up",
+        _MILLI,
+        largest=0.5,
+        smallest=1e-4,
+    ),
+    _row("chassis.pitch", "rad", "angle", "Chassis pitch", "nose down", _DEGREE, largest=0.35),
+    _row("chassis.roll", "rad", "angle", "Chassis roll", "left side up", _DEGREE, largest=0.35),
+    _row(
+        "chassis.a_x",
+        "m/s^2",
+        "acceleration",
+        "Chassis longitudinal acceleration",
+        "forward, inertial",
+        largest=30.0,
+    ),
+    _row("chassis.v_x", "m/s", "speed", "Speed", "forward", ("km/h", 3.6), largest=120.0),
+    _row("chassis.x", "m", "distance", "Distance travelled", "forward"),
+    _row(
+        "wheel.{corner}.z",
+        "m",
+        "displacement",
+        "{corner} wheel centre vertical displacement",
+        "of the rim centre from rest, up",
+        _MILLI,
+        largest=0.5,
+        smallest=1e-4,
+    ),
+    _row(
+        "tyre.{corner}.load", "N", "force", "{corner} tyre load", "compression", _KILO, largest=1e5
+    ),
+    _row(
+        "suspension.{corner}.travel",
+        "m",
+        "displacement",
+        "{corner} suspension travel",
+        "jounce",
+        _MILLI,
+        largest=0.5,
+    ),
+    _row(
+        "suspension.{corner}.spring_force",
+        "N",
+        "force",
+        "{corner} spring force",
+        "compression, preload included",
+        _KILO,
+        largest=1e5,
+    ),
+    _row(
+        "suspension.{corner}.damper_force",
+        "N",
+        "force",
+        "{corner} damper force",
+        "compression",
+        _KILO,
+        largest=1e5,
+    ),
+    _row(
+        "arm.{corner}.angle",
+        "rad",
+        "angle",
+        "{corner} trailing arm angle",
+        "about +y relative to the chassis: the front wheel falls, the rear wheel rises",
+        _DEGREE,
+        largest=1.6,
+    ),
+    _row(
+        "road.{corner}.z", "m", "displacement", "Road height under the {corner} wheel", "up", _MILLI
+    ),
+    _row(
+        "drive.{corner}.torque",
+        "N m",
+        "torque",
+        "{corner} drive torque",
+        "forward, from the chassis on the arm",
+        largest=2e4,
+    ),
+    _row(
+        "brake.{corner}.torque",
+        "N m",
+        "torque",
+        "{corner} brake torque",
+        "braking, a positive number",
+        largest=2e4,
+    ),
+    _row(
+        "post.{corner}.z",
+        "m",
+        "displacement",
+        "{corner} post height",
+        "of the contact point, up",
+        _MILLI,
+        largest=0.5,
+        smallest=1e-4,
+    ),
+    _row("chassis.z_rate", "m/s", "speed", "Chassis vertical rate", "up", largest=20.0),
+    _row(
+        "chassis.pitch_rate",
+        "rad/s",
+        "angular rate",
+        "Chassis pitch rate",
+        "nose down",
+        ("deg/s", _DEGREE[1]),
+        largest=5.0,
+    ),
+    _row(
+        "chassis.roll_rate",
+        "rad/s",
+        "angular rate",
+        "Chassis roll rate",
+        "left side up",
+        ("deg/s", _DEGREE[1]),
+        largest=5.0,
+    ),
+    _row(
+        "stabilizer_bar.{axle}.torque",
+        "N m",
+        "torque",
+        "{axle} stabilizer bar torque",
+        "by the left arm's angle less the right one's",
+        largest=2e5,
+    ),
+    _row("mount.{corner}.force_x", "N", "force", "{corner} mount force, along", "forward", _KILO),
+    _row("mount.{corner}.force_z", "N", "force", "{corner} mount force, vertical", "up", _KILO),
+    _row("pivot.{corner}.force_x", "N", "force", "{corner} pivot force, along", "forward", _KILO),
+    _row("pivot.{corner}.force_z", "N", "force", "{corner} pivot force, vertical", "up", _KILO),
+)
+"""The rows as documented; forces at mounts and pivots act on the chassis."""
+
+_POINT = re.compile(r"(seat|point)\.([a-z][a-z0-9_]*)\.a_([xyz])")
+_POINT_SIGN = {"x": "forward", "y": "left", "z": "up"}
+_CORNER_WORDS = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
+
+
+def _expanded(row: ChannelInfo) -> Iterator[ChannelInfo]:
+    """The channels a row stands for."""
+    for place, words in (
+        ("{corner}", {corner: _CORNER_WORDS[corner] for corner in CORNERS}),
+        ("{axle}", {axle: axle for axle in AXLES}),
+    ):
+        if place in row.name:
+            for key, word in words.items():
+                label = row.label.replace(place, word)
+                label = label[0].upper() + label[1:]
+                yield replace(row, name=row.name.replace(place, key), label=label)
+            return
+    yield row
+
+
+CHANNELS: Mapping[str, ChannelInfo] = MappingProxyType(
+    {info.name: info for row in CHANNEL_KINDS for info in _expanded(row)}
+)
+"""Every channel with a fixed name, in the order of the table."""
+
+_ORDER = {name: position for position, name in enumerate(CHANNELS)}
+
+
+def find_channel(name: str) -> ChannelInfo | None:
+    """What a channel is, or None for a name that is not ours."""
+    if name in CHANNELS:
+        return CHANNELS[name]
+    if match := _POINT.fullmatch(name):
+        kind, point, axis = match.groups()
+        where = f"{point.replace('_', ' ')}{' seat' if kind == 'seat' else ''}"
+        return _row(
+            name,
+            "m/s^2",
+            "acceleration",
+            f"Acceleration along {axis} at {where}",
+            _POINT_SIGN[axis],
+            largest=300.0,
+        )
+    return None
+
+
+def channel(name: str) -> ChannelInfo:
+    """What a channel is; an unknown name is refused with the nearest known one."""
+    info = find_channel(name)
+    if info is None:
+        near = near_channel(name)
+        hint = f"did you mean {near}?" if near else "see the table of channels."
+        raise MeasurementError(f"No channel is called {name!r}; {hint}")
+    return info
+
+
+def near_channel(name: str) -> str | None:
+    """The known channel a name may be a misspelling of; case and separators do not count."""
+    bare = _bare(name)
+    ratio, best = max(
+        (SequenceMatcher(None, bare, _bare(known)).ratio(), known) for known in CHANNELS
+    )
+    return best if ratio >= 0.8 else None
+
+
+def _bare(name: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """Time histories in SI of one recording or simulation.
+
+    time : (n,), strictly increasing, s
+    channels : name -> (n,) in the channel's SI unit
+    noise : name -> standard deviation of the measurement noise in SI, where it is known
+    warnings : sentences about what is doubtful in the recording
+    """
+
+    name: str
+    time: NDArray[np.float64]
+    channels: Mapping[str, NDArray[np.float64]]
+    noise: Mapping[str, float] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    description: str = ""
+
+    def __post_init__(self) -> None:
+        """Check the shapes and bring the channels into the table's order."""
+        time = np.ascontiguousarray(self.time, dtype=np.float64)
+        if time.ndim != 1 or time.size < 2 or not np.all(np.diff(time) > 0.0):
+            raise MeasurementError(
+                f"{self.name}: time must be one strictly increasing column of at least two samples."
+            )
+        ordered = {}
+        for name in sorted(self.channels, key=lambda name: (_ORDER.get(name, len(_ORDER)), name)):
+            info = channel(name)
+            values = np.ascontiguousarray(self.channels[name], dtype=np.float64)
+            if name == "time" or values.shape != time.shape:
+                raise MeasurementError(
+                    f"{self.name}: {info.name} has shape {values.shape}, but time has"
+                    f" {time.shape}; give one value a sample."
+                )
+            ordered[name] = values
+        object.__setattr__(self, "time", time)
+        object.__setattr__(self, "channels", ordered)
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        """One channel's values, or the time."""
+        if name == "time":
+            return self.time
+        if name not in self.channels:
+            channel(name)
+            raise MeasurementError(
+                f"{self.name}: there is no channel {name}; it holds {', '.join(self.columns)}."
+            )
+        return self.channels[name]
+
+    def __contains__(self, name: object) -> bool:
+        """Whether the run holds a channel (or the time, which it always does)."""
+        return name == "time" or name in self.channels
+
+    @property
+    def columns(self) -> list[str]:
+        """Names of the channels, time apart, in the order of the table."""
+        return list(self.channels)
+
+    @property
+    def duration(self) -> float:
+        """Time from the first sample to the last, s."""
+        return float(self.time[-1] - self.time[0])
+
+    @property
+    def sample_step(self) -> float:
+        """Median time between samples, s."""
+        return float(np.median(np.diff(self.time)))
