@@ -1,0 +1,134 @@
+"""Accelerations of the free car: road and posts modes.
+
+The four arms are eliminated from the 8 x 8 system, leaving four equations for the chassis
+(a Schur complement), solved by a square-root-free Cholesky factorisation.
+"""
+
+from typing import NamedTuple
+
+from ..jit import inlined
+from .equations import (
+    ArmEquation,
+    Quad,
+    arm_equation,
+    mass_add,
+    outer_product,
+    quad_add,
+    quad_dot,
+    quad_scale,
+    sprung_mass,
+    wheel_force_effect,
+)
+from .forces import bar_torque, road_wheel_force, strut, tyre_load
+from .kinematics import ArmPose, Attitude, WheelMotion, arm_pose, attitude, wheel_motion
+
+
+class FreeCorner(NamedTuple):
+    """One corner of the free car at one instant, before its bar is known."""
+
+    arm: ArmPose
+    wheel: WheelMotion
+    equation: ArmEquation
+    force_X: float
+    load: float
+    on_chassis: Quad
+    moment: float
+    """On the arm about its pivot, from tyre, spring-damper, drive and brake."""
+
+
+class Accelerations(NamedTuple):
+    """Second derivatives of the eight coordinates."""
+
+    chassis: Quad
+    fl: float
+    fr: float
+    rl: float
+    rr: float
+
+
+@inlined
+def chassis_attitude(state):
+    """Attitude of the chassis in a state."""
+    return attitude(state.pitch, state.roll, state.pitch_rate, state.roll_rate)
+
+
+@inlined
+def free_corner(corner, chassis: Attitude, state, angle, rate, given, direction):
+    """Forces and inertia of one corner, driven by its contact point and torques."""
+    arm = arm_pose(angle, rate)
+    wheel = wheel_motion(corner, chassis, arm, state.z, state.x_rate, state.z_rate)
+    load = tyre_load(corner, wheel, given.road, given.road_rate)
+    force_X, torque = road_wheel_force(corner, load, given, direction)
+    on_chassis, on_arm = wheel_force_effect(chassis, wheel, force_X, load, corner.radius)
+    moment = on_arm + torque + strut(corner, wheel.arm, arm).moment
+    equation = arm_equation(corner, chassis, arm)
+    return FreeCorner(arm, wheel, equation, force_X, load, on_chassis, moment)
+
+
+@inlined
+def condensed(corner, moment):
+    """What a corner adds to the chassis's equations once its arm is eliminated.
+
+    Mass M_cc - m m^T / M and force Q_c - h_c - m (Q - h) / M.
+    """
+    equation = corner.equation
+    m = equation.coupling
+    mass = mass_add(equation.chassis_mass, outer_product(-1.0 / equation.inertia, m, m))
+    carried = quad_scale((equation.bias - moment) / equation.inertia, m)
+    given = quad_add(corner.on_chassis, quad_scale(-1.0, equation.chassis_bias))
+    return mass, quad_add(given, carried)
+
+
+@inlined
+def solve_chassis(mass, force):
+    """Solve the symmetric positive definite 4 x 4 system mass c'' = force by L D L^T."""
+    d1 = 1.0 / mass.xx
+    l21, l31, l41 = mass.xz * d1, mass.xp * d1, mass.xr * d1
+    d2 = 1.0 / (mass.zz - l21 * mass.xz)
+    u32, u42 = mass.zp - l31 * mass.xz, mass.zr - l41 * mass.xz
+    l32, l42 = u32 * d2, u42 * d2
+    d3 = 1.0 / (mass.pp - l31 * mass.xp - l32 * u32)
+    u43 = mass.pr - l41 * mass.xp - l42 * u32
+    l43 = u43 * d3
+    d4 = 1.0 / (mass.rr - l41 * mass.xr - l42 * u42 - l43 * u43)
+
+    b2 = force.z - l21 * force.x
+    b3 = force.pitch - l31 * force.x - l32 * b2
+    b4 = force.roll - l41 * force.x - l42 * b2 - l43 * b3
+    roll = b4 * d4
+    pitch = b3 * d3 - l43 * roll
+    z = b2 * d2 - l32 * pitch - l42 * roll
+    x = force.x * d1 - l21 * z - l31 * pitch - l41 * roll
+    return Quad(x, z, pitch, roll)
+
+
+@inlined
+def arm_acceleration(corner, moment, chassis_acceleration):
+    """a'' = (Q - h - m . c'') / M of one arm once the chassis is known."""
+    equation = corner.equation
+    remaining = moment - equation.bias - quad_dot(equation.coupling, chassis_acceleration)
+    return remaining / equation.inertia
+
+
+@inlined
+def accelerations(body, chassis, fl, fr, rl, rr):
+    """Second derivatives of all coordinates from the four corners' forces and inertias."""
+    front = bar_torque(body.front_bar_stiffness, body.front_bar_damping, fl.arm, fr.arm)
+    rear = bar_torque(body.rear_bar_stiffness, body.rear_bar_damping, rl.arm, rr.arm)
+    fl_moment, fr_moment = fl.moment - front, fr.moment + front
+    rl_moment, rr_moment = rl.moment - rear, rr.moment + rear
+    mass, bias = sprung_mass(body, chassis)
+    fl_mass, fl_force = condensed(fl, fl_moment)
+    fr_mass, fr_force = condensed(fr, fr_moment)
+    rl_mass, rl_force = condensed(rl, rl_moment)
+    rr_mass, rr_force = condensed(rr, rr_moment)
+    mass = mass_add(mass, mass_add(mass_add(fl_mass, fr_mass), mass_add(rl_mass, rr_mass)))
+    arms = quad_add(quad_add(fl_force, fr_force), quad_add(rl_force, rr_force))
+    acceleration = solve_chassis(mass, quad_add(arms, quad_scale(-1.0, bias)))
+    return Accelerations(
+        acceleration,
+        arm_acceleration(fl, fl_moment, acceleration),
+        arm_acceleration(fr, fr_moment, acceleration),
+        arm_acceleration(rl, rl_moment, acceleration),
+        arm_acceleration(rr, rr_moment, acceleration),
+    )

@@ -1,0 +1,80 @@
+"""Forces of springs, dampers, bars and tyres."""
+
+from math import sqrt
+from typing import NamedTuple
+
+from ..jit import inlined
+from .elementary import hyperbolic_tangent
+from .vec3 import y_cross
+
+CREEP_SPEED = 0.1
+"""v0 of tanh(v/v0), m/s: rolling resistance and brakes fade out below it."""
+
+
+class Strut(NamedTuple):
+    """Spring-damper element: its state and forces, N, compression positive."""
+
+    travel: float
+    """L0 - L, jounce positive, m."""
+    spring: float
+    damper: float
+    axis_x: float
+    """Unit vector from wheel centre to mount, B (it has no y)."""
+    axis_z: float
+    moment: float
+    """On the arm about its pivot, N m."""
+
+
+@inlined
+def direction_of_travel(x_rate):
+    """tanh(v / v0), v the chassis's x rate: +1 forward, -1 backward, 0 at rest."""
+    return hyperbolic_tangent(x_rate / CREEP_SPEED)
+
+
+@inlined
+def strut(corner, p, arm):
+    """Spring-damper between the wheel centre p (from the pivot, B) and the mount.
+
+    F = F0 + K (L0 - L) - C dL/dt on the mount along the element, minus that on the wheel
+    (eq. 9 of docs/model.md). Only the arm's rotation changes L.
+    """
+    x, z = corner.mount_x - p[0], corner.mount_z - p[2]
+    length = sqrt(x * x + z * z)
+    axis_x, axis_z = x / length, z / length
+    along = y_cross(p)
+    length_rate = -arm.rate * (axis_x * along[0] + axis_z * along[2])
+    travel = corner.rest_length - length
+    spring = corner.preload + corner.stiffness * travel
+    damper = -corner.damping * length_rate
+    moment = -(spring + damper) * (axis_x * along[0] + axis_z * along[2])
+    return Strut(travel, spring, damper, axis_x, axis_z, moment)
+
+
+@inlined
+def bar_torque(stiffness, damping, left, right):
+    """Torque of a stabilizer bar: minus this on the left arm, plus this on the right one."""
+    return stiffness * (left.angle - right.angle) + damping * (left.rate - right.rate)
+
+
+@inlined
+def tyre_load(corner, wheel, road, road_rate):
+    """W = W0 + Kt (road - rise) + Ct (road' - rise'), not below the load floor, N."""
+    load = (
+        corner.static_load
+        + corner.tyre_stiffness * (road - wheel.rise)
+        + corner.tyre_damping * (road_rate - wheel.rise_rate)
+    )
+    return max(load, corner.load_floor)
+
+
+@inlined
+def road_wheel_force(corner, load, given, direction):
+    """Longitudinal force at r below the wheel centre, and the torque of its cause on the arm.
+
+    Fx = T / r - (B / r + fr W) tanh(v / v0). Torque that the chassis exerts on the arm: +T and
+    -B tanh where the reaction is on the chassis, nothing where it stays inside the arm.
+    """
+    braking = given.brake * direction
+    force = (given.drive - braking) / corner.radius - corner.rolling_resistance * load * direction
+    torque = corner.drive_reaction * given.drive - corner.brake_reaction * braking
+    return force, torque
