@@ -1,0 +1,1 @@
+"""Slow independent models the engine is held against."""
