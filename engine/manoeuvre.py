@@ -1,0 +1,166 @@
+"""A manoeuvre: torque law, road and duration as data, read from a small JSON file.
+
+    {"name": "...", "description": "...", "kind": "road" or "posts", "duration": s,
+     "initial_speed": m/s, "drive": {"kind": ...}, "brake": {"kind": ...}, "road": {"kind": ...},
+     "posts": {"pattern": ...}, "seed": whole number}
+
+The keys of each part are the fields of the record of that kind in `torque_laws`, `road_specs` and
+`post_sweep`; unknown ones are refused with the nearest known name.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from .demand import Demand, PiecewiseLinear, PointMassMotion, PostMotion, point_mass_motion
+from .errors import ManoeuvreError
+from .json_record import RecordReader, record_to_json
+from .post_sweep import PostSweep
+from .road_specs import FlatRoad, Place, RoadSpec
+from .torque_laws import LONGEST, BrakeLaw, DriveLaw, Speed
+from .vehicle import Range, Vehicle
+
+__all__ = [
+    "Demand",
+    "Manoeuvre",
+    "PiecewiseLinear",
+    "PostMotion",
+    "manoeuvre_from_json",
+    "manoeuvre_to_json",
+    "read_manoeuvre",
+    "reference_manoeuvres",
+]
+
+LARGEST_FILE = 5_000_000
+"""Longest manoeuvre file that is read, bytes."""
+
+ROAD_MARGIN = 0.02
+"""The road is longer than the point mass's way by this share and 10 m: the car's own way differs
+from it by less."""
+
+ORDER = (
+    *("1", "2", "brake", "coast", "constant-speed-c", "bump", "pothole", "sine-sweep"),
+    *("heave", "pitch", "roll", "warp"),
+)
+"""Keys of the manoeuvres that come with the package, as a person meets them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Manoeuvre:
+    """What is done with a car, whichever car it is.
+
+    kind : driven on a road, or standing on a four-post rig
+    duration : s;  initial_speed : m/s
+    drive, brake : torque laws; None is no torque
+    road : None is level ground;  posts : only of kind "posts"
+    seed : of everything random
+    """
+
+    name: str
+    kind: Literal["road", "posts"]
+    duration: Annotated[float, Range("s", 0.1, LONGEST)]
+    description: str = ""
+    initial_speed: Speed = 0.0
+    drive: DriveLaw | None = None
+    brake: BrakeLaw | None = None
+    road: RoadSpec | None = None
+    posts: PostSweep | None = None
+    seed: Annotated[int, Range("1", 0, 2**53)] = 0
+
+    def __post_init__(self) -> None:
+        """Refuse parts that do not belong to the kind."""
+        driven = self.drive or self.brake or self.road or self.initial_speed
+        if self.kind == "posts" and (driven or self.posts is None):
+            raise ManoeuvreError(
+                'a manoeuvre of kind "posts" has "posts" and no drive, brake, road or'
+                " initial_speed; correct them or the kind."
+            )
+        if self.kind == "road" and self.posts is not None:
+            raise ManoeuvreError('"posts" belongs to kind "posts"; remove it or change the kind.')
+
+    def demand(self, vehicle: Vehicle) -> Demand:
+        """What this manoeuvre asks of one car: its torques, and its road or posts."""
+        drive = brake = PiecewiseLinear.zero(self.duration)
+        if self.drive is not None:
+            drive = self.drive.wheel_torque(vehicle, self.initial_speed, self.duration)
+        if self.brake is not None:
+            brake = self.brake.wheel_torque(vehicle, self.duration)
+        road = posts = None
+        if self.posts is not None:
+            posts = self.posts.motion(self.duration)
+        else:
+            motion = point_mass_motion(vehicle, drive, brake, self.initial_speed, self.duration)
+            road = (self.road or FlatRoad()).build(self._place(vehicle, motion), self.seed)
+        return Demand(self.duration, self.initial_speed, drive, brake, road, posts)
+
+    def _place(self, vehicle: Vehicle, motion: PointMassMotion) -> Place:
+        """Where the car is when the road matters."""
+        off = None if self.drive is None else self.drive.end()
+        contact = vehicle.front.cg_distance
+        farthest = float(motion.x.max()) * (1.0 + ROAD_MARGIN)
+        return Place(
+            first_contact=contact,
+            torque_end=None if off is None else motion.distance(off),
+            end=farthest + contact + 10.0,
+        )
+
+
+def manoeuvre_from_json(data: Any, source: str = "manoeuvre") -> Manoeuvre:
+    """Read a manoeuvre from parsed JSON; raises ManoeuvreError naming source and dotted field."""
+    return RecordReader(source, ManoeuvreError).record(Manoeuvre, data)
+
+
+def manoeuvre_to_json(manoeuvre: Manoeuvre) -> dict[str, Any]:
+    """The manoeuvre as plain JSON data that reads back equal."""
+    return record_to_json(manoeuvre)
+
+
+def read_manoeuvre(path: str | Path) -> Manoeuvre:
+    """Read a manoeuvre file; raises ManoeuvreError naming the file, the place and the remedy."""
+    path = Path(path)
+    try:
+        with path.open("rb") as stream:
+            text = stream.read(LARGEST_FILE + 1)
+    except OSError as error:
+        raise ManoeuvreError(
+            f"{path}: the manoeuvre file cannot be read ({error.strerror}); check the path."
+        ) from error
+    return manoeuvre_from_text(text, path.name)
+
+
+def manoeuvre_from_text(data: bytes, source: str = "manoeuvre") -> Manoeuvre:
+    """Parse and check the bytes of a manoeuvre file."""
+    if len(data) > LARGEST_FILE:
+        raise ManoeuvreError(
+            f"{source}: the file is larger than {LARGEST_FILE // 1_000_000} MB, which no manoeuvre"
+            " is; choose the manoeuvre's JSON file."
+        )
+    try:
+        content = json.loads(data.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise ManoeuvreError(
+            f"{source}: the file is not UTF-8 text (byte {error.start + 1}); save it as JSON in"
+            " UTF-8."
+        ) from error
+    except json.JSONDecodeError as error:
+        raise ManoeuvreError(
+            f"{source}: line {error.lineno}, column {error.colno}: not valid JSON ({error.msg});"
+            " correct it there or just before."
+        ) from error
+    except (ValueError, RecursionError) as error:
+        raise ManoeuvreError(f"{source}: not a usable JSON file ({error}); correct it.") from error
+    return manoeuvre_from_json(content, source)
+
+
+@cache
+def _reference_manoeuvres() -> Mapping[str, Manoeuvre]:
+    folder = Path(__file__).parent / "manoeuvres"
+    return {key: read_manoeuvre(folder / f"{key}.json") for key in ORDER}
+
+
+def reference_manoeuvres() -> dict[str, Manoeuvre]:
+    """The manoeuvres that come with the package, by key."""
+    return dict(_reference_manoeuvres())
