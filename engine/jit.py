@@ -11,9 +11,12 @@ edit of a helper elsewhere; the cache folder is therefore named by a hash of all
 import hashlib
 import os
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numba
+from numba.core import config
 
 # NaN and infinity keep their meaning: a diverged car must show. Divisions follow IEEE, without
 # the branch that Python's ZeroDivisionError would put into every loop.
@@ -47,7 +50,7 @@ def cache_folder() -> Path:
     return Path(tempfile.mkdtemp(prefix=f"ridetune-{name}-"))
 
 
-numba.config.CACHE_DIR = str(cache_folder())
+config.CACHE_DIR = str(cache_folder())  # pyright: ignore[reportAttributeAccessIssue]
 
-inlined = numba.njit(forceinline=True, **_ARITHMETIC)
-compiled = numba.njit(cache=True, nogil=True, **_ARITHMETIC)
+inlined: Callable[[Callable], Any] = numba.njit(forceinline=True, **_ARITHMETIC)
+compiled: Callable[[Callable], Any] = numba.njit(cache=True, nogil=True, **_ARITHMETIC)

@@ -8,8 +8,12 @@ tuple argument, which is part of its type: 1 for one car, 8 for batches.
 Records are loaded from and stored to consecutive rows, one row a field.
 """
 
+from collections.abc import Callable
+from typing import Any
+
 from llvmlite import ir
-from numba import config, types
+from numba import types
+from numba.core import config
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
 
@@ -29,10 +33,10 @@ def _address(context, builder, signature, args, row):
     return builder.gep(array.data, [index])
 
 
-def loader(record):
+def loader(record: Any) -> Callable[..., Any]:
     """Function (buffer, first row, LANES, lane) -> record."""
     size = len(record._fields)
-    if config.DISABLE_JIT:
+    if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
         return lambda buffer, first, lanes, lane: record(
             *(buffer[(first + row) * lanes + lane] for row in range(size))
         )
@@ -53,10 +57,10 @@ def loader(record):
     return load
 
 
-def storer(record):
+def storer(record: Any) -> Callable[..., None]:
     """Function (buffer, first row, LANES, lane, record) that stores the record's fields."""
     size = len(record._fields)
-    if config.DISABLE_JIT:
+    if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
 
         def store_in_python(buffer, first, lanes, lane, value):
             for row in range(size):

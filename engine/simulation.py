@@ -1,0 +1,325 @@
+"""One car through one manoeuvre, one recording or one rig test: the public face of the model.
+
+Three modes (docs/model.md): `simulate_road` drives the car over a road by torques,
+`simulate_rims` prescribes the wheel centres and a_x of a recording, `simulate_posts` stands the
+car on four moving posts. `rims_batch` is the identification's view of many cars at once.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import baseline
+from .car_rows import car_row, car_rows
+from .channels import Run
+from .demand import Demand, PiecewiseLinear, PostMotion
+from .errors import SimulationError
+from .filters import smoothed
+from .frames import CORNERS
+from .integration import check_sound, free_outputs, free_states, rims_outputs, rims_states
+from .manoeuvre import Manoeuvre
+from .observation import (
+    DEFAULT_POINTS,
+    Points,
+    common_channels,
+    corner_output,
+    torque_channels,
+    traction_torques,
+)
+from .rims import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, RimsInputs, RimsSettings, prepare
+from .road import Road
+from .stepping import prepare_free
+from .vehicle import Vehicle
+
+Array = NDArray[np.float64]
+Model = Literal["8dof", "7dof"]
+Traction = Literal["exact", "paper"]
+
+FREE_STEP = 0.002
+"""Integration step of the road and posts modes, s: wheel hop is in them."""
+
+SAMPLE_STEP = 0.005
+"""Time between samples of a result, s."""
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """What a simulation gives.
+
+    run : every channel the mode and the model have, at the sample times
+    negative_load_share : per corner, share of the samples with a tyre load at or below zero; the
+        model then pulls on the road (or, with lift-off, has left it)
+    fit_percent : rims mode, per measured channel: 100 (1 - |y - y_hat| / |y - mean(y)|)
+    steps : integration steps taken
+    """
+
+    mode: Literal["road", "rims", "posts"]
+    run: Run
+    negative_load_share: Mapping[str, float]
+    steps: int
+    fit_percent: Mapping[str, float] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+
+def simulate_road(
+    vehicle: Vehicle,
+    manoeuvre: Manoeuvre,
+    *,
+    road: Road | None = None,
+    model: Model = "8dof",
+    lift_off: bool = False,
+    step: float = FREE_STEP,
+    sample_step: float = SAMPLE_STEP,
+    points: Points = DEFAULT_POINTS,
+) -> Simulation:
+    """Drive a car through a manoeuvre of kind "road".
+
+    road : takes the place of the manoeuvre's own
+    lift_off : tyres do not pull
+    Raises SimulationError for a manoeuvre of the other kind or steps outside what is accepted,
+    SimulationDiverged when the car leaves the model's range.
+    """
+    if manoeuvre.kind != "road":
+        raise SimulationError(
+            f"Manoeuvre {manoeuvre.name!r} moves the posts of a rig; simulate it in posts mode."
+        )
+    demand = manoeuvre.demand(vehicle)
+    if road is not None:
+        demand = replace(demand, road=road)
+    return _free(
+        "road", vehicle, manoeuvre.name, demand, model, lift_off, step, sample_step, points
+    )
+
+
+def simulate_posts(
+    vehicle: Vehicle,
+    motion: Manoeuvre | Run,
+    *,
+    model: Model = "8dof",
+    lift_off: bool = False,
+    step: float = FREE_STEP,
+    sample_step: float = SAMPLE_STEP,
+    points: Points = DEFAULT_POINTS,
+) -> Simulation:
+    """Stand a car on a four-post rig.
+
+    motion : a manoeuvre of kind "posts", or a run with the four channels post.*.z; a run's posts
+        are joined by a C2 spline and its first sample becomes t = 0
+    """
+    if isinstance(motion, Run):
+        demand = _posts_demand(motion)
+    elif motion.kind == "posts":
+        demand = motion.demand(vehicle)
+    else:
+        raise SimulationError(
+            f"Manoeuvre {motion.name!r} drives on a road; simulate it in road mode."
+        )
+    return _free("posts", vehicle, motion.name, demand, model, lift_off, step, sample_step, points)
+
+
+def simulate_rims(
+    vehicle: Vehicle,
+    run: Run,
+    *,
+    traction: Traction = "exact",
+    settings: RimsSettings | None = None,
+    model: Model = "8dof",
+    points: Points = DEFAULT_POINTS,
+) -> Simulation:
+    """Let a car follow the wheel centres and a_x of a recording, at the recording's own times.
+
+    traction : "exact" follows a_x exactly; "paper" is the paper's Eq. 3, biased, for comparison
+    Raises MeasurementError for a run without the inputs, SimulationDiverged when a wheel centre
+    cannot reach its height or the car leaves the model's range.
+    """
+    settings = settings or RimsSettings()
+    inputs = prepare(run, vehicle, settings)
+    if model == "7dof":
+        heights = np.column_stack([run[name] for name in WHEEL_CHANNELS])
+        result = baseline.simulate_rims(vehicle, run.time, heights, points)
+        loads = {}
+    else:
+        result = _rims_run(vehicle, inputs, traction, points)
+        loads = _load_shares(result)
+    return Simulation(
+        "rims",
+        result,
+        loads,
+        inputs.node_time.size - 1,
+        _fit_percent(result, run, settings),
+        inputs.warnings,
+    )
+
+
+def rims_batch(vehicles: Sequence[Vehicle], inputs: RimsInputs, traction: Traction) -> Array:
+    """z, pitch and roll of many cars on the same rims, (cars, samples, 3); NaN where one failed."""
+    states = rims_states(car_rows(vehicles), inputs, traction == "exact")
+    values, rates = states.values[:, :, 1:4], states.values[:, :, 9:12]
+    return inputs.at_samples(values, rates)
+
+
+def fit_percent(measured: Array, simulated: Array) -> float:
+    """100 (1 - |y - y_hat| / |y - mean(y)|); minus infinity for a constant measurement missed."""
+    scatter = float(np.linalg.norm(measured - np.mean(measured)))
+    miss = float(np.linalg.norm(measured - simulated))
+    if scatter == 0.0:
+        return 100.0 if miss == 0.0 else -np.inf
+    return 100.0 * (1.0 - miss / scatter)
+
+
+def accelerations(
+    vehicle: Vehicle,
+    q: Array,
+    qd: Array,
+    *,
+    road_height: Array,
+    road_rate: Array,
+    drive: Array,
+    brake: Array,
+    lift_off: bool = False,
+) -> Array:
+    """Second derivatives (8,) of the free car's coordinates in one state.
+
+    q, qd (8,) : coordinates (`frames.COORDINATES`) and rates
+    road_height, road_rate, drive, brake (4,) : contact points' heights (m) and rates, torques (N m)
+    """
+    acting = np.concatenate([road_height, road_rate, drive, brake])[np.newaxis]
+    state = np.concatenate([q, qd])[np.newaxis]
+    out = free_outputs(car_row(vehicle, lift_off), state, acting, Road.flat())
+    arms = [corner_output(out, corner, "acceleration")[0] for corner in range(4)]
+    return np.array([*out[0, :4], *arms])
+
+
+def rims_accelerations(
+    vehicle: Vehicle,
+    pose: Array,
+    rates: Array,
+    v: float,
+    u: Array,
+    u_rate: Array,
+    u_acc: Array,
+    a_x: float,
+    braking: float = 0.0,
+    traction: Traction = "exact",
+) -> dict[str, Array]:
+    """Second derivatives and wheel forces of a car on its rims in one state.
+
+    pose, rates (3,) : z, pitch, roll and their rates; v : speed, m/s
+    u, u_rate, u_acc (4,) : wheel centres' heights from rest and derivatives
+    Returns q, qd and qdd (8,), vertical_force and longitudinal_force (4,).
+    """
+    state = np.zeros(16)
+    state[1:4], state[8], state[9:12] = pose, v, rates
+    acting = np.concatenate([u, u_rate, u_acc, [a_x, v, braking]])[np.newaxis]
+    out = rims_outputs(car_row(vehicle), state[np.newaxis], acting, traction == "exact")
+
+    def of_corners(name: str) -> Array:
+        return np.array([corner_output(out, corner, name)[0] for corner in range(4)])
+
+    return {
+        "q": np.concatenate([state[:4], of_corners("angle")]),
+        "qd": np.concatenate([state[8:12], of_corners("rate")]),
+        "qdd": np.concatenate([out[0, :4], of_corners("acceleration")]),
+        "vertical_force": of_corners("load"),
+        "longitudinal_force": of_corners("longitudinal"),
+    }
+
+
+def _free(
+    mode: Literal["road", "posts"],
+    vehicle: Vehicle,
+    name: str,
+    demand: Demand,
+    model: Model,
+    lift_off: bool,
+    step: float,
+    sample_step: float,
+    points: Points,
+) -> Simulation:
+    """Road and posts modes, which differ only in what moves the contact points."""
+    inputs = prepare_free(demand, step, sample_step)
+    if model == "7dof":
+        if demand.posts is not None:
+            result = baseline.simulate_posts(vehicle, demand.posts, sample_step, points)
+        else:
+            result = baseline.simulate_road(vehicle, demand, sample_step, points)
+        result = replace(result, name=name)
+        return Simulation(mode, result, _load_shares(result), inputs.steps.size)
+    car = car_row(vehicle, lift_off)
+    states = free_states(car[np.newaxis], inputs)
+    check_sound(states, 0, inputs.time)
+    outputs = free_outputs(car, states.values[0], inputs.sample_inputs, inputs.road)
+    channels = common_channels(states.values[0], outputs, points)
+    channels |= torque_channels(inputs.sample_inputs)
+    ground = "road.{}.z" if mode == "road" else "post.{}.z"
+    for index, corner in enumerate(CORNERS):
+        channels[ground.format(corner)] = corner_output(outputs, index, "road")
+    result = Run(name, inputs.time, channels)
+    return Simulation(mode, result, _load_shares(result), inputs.steps.size)
+
+
+def _rims_run(vehicle: Vehicle, inputs: RimsInputs, traction: Traction, points: Points) -> Run:
+    """Channels of the 8-DOF car on its rims, at the recording's times."""
+    exact = traction == "exact"
+    car = car_row(vehicle)
+    states = rims_states(car[np.newaxis], inputs, exact)
+    nodal = np.concatenate([inputs.stage_inputs[:1, 0], inputs.stage_inputs[:, 2]])
+    failed = int(states.failed[0])
+    if failed >= 0:
+        before = slice(max(failed - 1, 0), max(failed, 1))
+        seen = rims_outputs(car, states.values[0, before], nodal[failed : failed + 1], exact)
+        reach = np.array([corner_output(seen, corner, "reach")[0] for corner in range(4)])
+        check_sound(states, 0, inputs.node_time, reach)
+    outputs = rims_outputs(car, states.values[0], nodal, exact)
+    channels = common_channels(states.values[0], outputs, points)
+    channels |= traction_torques(vehicle, outputs, nodal[:, 14])
+    channels["chassis.v_x"] = nodal[:, 13]
+    if inputs.on_nodes:
+        channels = {name: values[inputs.sample_node] for name, values in channels.items()}
+    else:
+        motion = states.values[0]
+        smooth = inputs.at_samples(motion[:, 1:4], motion[:, 9:12])
+        channels = {
+            name: np.interp(inputs.time, inputs.node_time, values)
+            for name, values in channels.items()
+        }
+        channels |= {name: smooth[:, k] for k, name in enumerate(OUTPUT_CHANNELS)}
+    return Run(inputs.name, inputs.time, channels)
+
+
+def _fit_percent(simulated: Run, measured: Run, settings: RimsSettings) -> dict[str, float]:
+    """Fit of every channel that was measured, simulated and not prescribed."""
+    given = {*INPUT_CHANNELS, "chassis.v_x", "chassis.x"}
+    scores = {}
+    for name in measured.columns:
+        if name in simulated and name not in given:
+            cutoff = settings.output_cutoff_hz if name in OUTPUT_CHANNELS else None
+            histories = (smoothed(run.time, run[name], cutoff) for run in (measured, simulated))
+            scores[name] = fit_percent(*histories)
+    return scores
+
+
+def _load_shares(run: Run) -> dict[str, float]:
+    return {
+        corner: float(np.mean(run[f"tyre.{corner}.load"] <= 0.0))
+        for corner in CORNERS
+        if f"tyre.{corner}.load" in run
+    }
+
+
+def _posts_demand(run: Run) -> Demand:
+    """Demand of a rig test from a run with the posts' heights."""
+    names = [f"post.{corner}.z" for corner in CORNERS]
+    missing = [name for name in names if name not in run]
+    if missing:
+        raise SimulationError(
+            f"Run {run.name} lacks {', '.join(missing)}; a rig test needs time and the four"
+            " post.*.z."
+        )
+    time = run.time - run.time[0]
+    heights = np.column_stack([run[name] for name in names])
+    still = PiecewiseLinear.zero(run.duration)
+    return Demand(run.duration, 0.0, still, still, None, PostMotion(time, heights))

@@ -1,0 +1,128 @@
+"""The integrator's steps and what acts on the car during each of them.
+
+A step never straddles a sample, a knot of a torque or a jump: boundaries are laid at all of them
+and each interval between two is divided evenly. Inputs are evaluated at the beginning, middle and
+end of every step, at its ends from inside the step.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from .demand import Demand
+from .errors import SimulationError
+from .road import Road
+
+SHORTEST_STEP, LONGEST_STEP = 1e-5, 0.02
+"""Accepted integration steps, s: below, rounding and patience suffer; above, wheel hop does."""
+
+MOST_STEPS = 20_000_000
+"""Refused above: half an hour of computing for one car."""
+
+_SAME_INSTANT = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class FreeInputs:
+    """What drives the free car (road and posts modes), ready for the kernels.
+
+    time (S,) : sample times, s
+    steps (n,) : step lengths, s
+    samples (n + 1,) : index of the sample before step k, or -1
+    stage_inputs (n, 3, 16) : post heights, post rates, drive and brake torques of four corners
+    sample_inputs (S, 16) : the same at the samples
+    road : both profiles
+    initial_speed : m/s
+    """
+
+    time: NDArray[np.float64]
+    steps: NDArray[np.float64]
+    samples: NDArray[np.int64]
+    stage_inputs: NDArray[np.float64]
+    sample_inputs: NDArray[np.float64]
+    road: Road
+    initial_speed: float
+
+
+def prepare_free(demand: Demand, step: float, sample_step: float) -> FreeInputs:
+    """Steps no longer than `step` and samples every `sample_step` over a demand's duration.
+
+    Raises SimulationError for a step, a sampling or a number of steps outside what is accepted.
+    """
+    _check_number("step", step, SHORTEST_STEP, LONGEST_STEP)
+    _check_number("sample_step", sample_step, SHORTEST_STEP, 1.0)
+    if not (math.isfinite(demand.duration) and demand.duration >= sample_step):
+        raise SimulationError(
+            f"duration is {demand.duration} s; it must cover at least one sample step of"
+            f" {sample_step} s."
+        )
+    expected = demand.duration / min(step, sample_step)
+    if expected > MOST_STEPS:
+        raise SimulationError(
+            f"{expected:.3g} steps are asked for, {MOST_STEPS} are accepted; take a longer step"
+            " or a shorter duration."
+        )
+    count = math.floor(demand.duration / sample_step + _SAME_INSTANT)
+    time = sample_step * np.arange(count + 1, dtype=np.float64)
+    boundaries, sampled = _boundaries(time, np.union1d(demand.drive.knots, demand.brake.knots))
+    lengths = np.diff(boundaries)
+    parts = np.ceil(lengths / step - _SAME_INSTANT).astype(np.int64)
+    steps = np.repeat(lengths / parts, parts)
+    first_step = np.concatenate([[0], np.cumsum(parts)])
+    samples = np.full(steps.size + 1, -1, dtype=np.int64)
+    samples[first_step[sampled]] = np.arange(time.size)
+    within = np.arange(steps.size) - np.repeat(first_step[:-1], parts)
+    begin = np.repeat(boundaries[:-1], parts) + within * steps
+    stages = np.stack(
+        [
+            _acting(demand, begin, "right"),
+            _acting(demand, begin + 0.5 * steps, "right"),
+            _acting(demand, begin + steps, "left"),
+        ],
+        axis=1,
+    )
+    return FreeInputs(
+        time,
+        steps,
+        samples,
+        np.ascontiguousarray(stages),
+        _acting(demand, time, "left"),
+        demand.road or Road.flat(),
+        demand.initial_speed,
+    )
+
+
+def _check_number(name: str, value: float, lower: float, upper: float) -> None:
+    if not lower <= value <= upper:
+        raise SimulationError(f"{name} is {value} s; give one between {lower:g} s and {upper:g} s.")
+
+
+def _boundaries(
+    time: NDArray[np.float64], knots: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Sample times and the knots between them, and which of them are samples."""
+    inside = knots[(knots > time[0]) & (knots < time[-1])]
+    nearest = time[np.clip(np.searchsorted(time, inside), 1, time.size - 1)]
+    before = time[np.clip(np.searchsorted(time, inside) - 1, 0, time.size - 1)]
+    apart = np.minimum(np.abs(nearest - inside), np.abs(inside - before)) > _SAME_INSTANT
+    boundaries = np.union1d(time, inside[apart])
+    return boundaries, np.searchsorted(boundaries, time)
+
+
+def _acting(demand: Demand, time: NDArray[np.float64], side) -> NDArray[np.float64]:
+    """Post heights, their rates, drive and brake torques at given times, (n, 16)."""
+    if demand.posts is None:
+        height = rate = np.zeros((time.size, 4))
+    else:
+        posts = demand.posts
+        spline = CubicSpline(posts.time, posts.height)
+        held = np.clip(time, posts.time[0], posts.time[-1])
+        height = spline(held)
+        rate = np.where((held == time)[:, np.newaxis], spline(held, 1), 0.0)
+    # Rounding must not carry a stage across the jump at its step's end.
+    nudge = -_SAME_INSTANT if side == "left" else _SAME_INSTANT
+    drive, brake = (torque.at(time + nudge, side) for torque in (demand.drive, demand.brake))
+    return np.concatenate([height, rate, drive, brake], axis=1)
