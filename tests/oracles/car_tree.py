@@ -144,6 +144,12 @@ class CarTree:
         mujoco.mj_jac(self.model, self.data, jacobian, None, point, index)
         return jacobian
 
+    def point_acceleration(self, point, body, qd, qdd):
+        """Acceleration (3,) in E of a point of E that moves with a body."""
+        rate = np.zeros((3, 8))
+        mujoco.mj_jacDot(self.model, self.data, rate, None, point, self.model.body(body).id)
+        return self.point_jacobian(point, body) @ qdd + rate @ qd
+
     # --- positions by hand ------------------------------------------------------------------
 
     def origin(self, q):

@@ -11,7 +11,7 @@ of the same equation. Nothing here knows how the engine eliminates, orders or si
 
 import numpy as np
 
-from .car_tree import CORNERS, EX, EY, EZ, PITCH, ROLL, CarTree, X, about_x, about_y
+from .car_tree import CORNERS, EX, EY, EZ, GRAVITY, PITCH, ROLL, CarTree, X, about_x, about_y
 
 REST_SPEED = 0.1
 
@@ -19,18 +19,24 @@ REST_SPEED = 0.1
 class MujocoCar(CarTree):
     """Accelerations of one vehicle in the direct (road) and the prescribed (rims) mode."""
 
+    def spring_and_damper(self, q, qd, i):
+        """Length of spring-damper i, m, its force along itself, N, and the damper's part."""
+        data = self.corners[i].axle.suspension
+        p_C, p_A = self.wheel_centre(q, i), self.mount(q, i)
+        J = self.point_jacobian(p_A, "chassis") - self.point_jacobian(p_C, CORNERS[i])
+        length = np.linalg.norm(p_A - p_C)
+        along = (p_A - p_C) / length
+        damper = -data.damping * along @ J @ qd
+        spring = self.corners[i].preload + data.stiffness * (data.mount_height - length)
+        return length, (spring + damper) * along, damper
+
     def suspension_forces(self, q, qd):
         """Generalized forces (8,) of springs, dampers and stabilizer bars."""
         total = np.zeros(8)
-        for i, (name, corner) in enumerate(zip(CORNERS, self.corners, strict=True)):
-            data, p_C, p_A = corner.axle.suspension, self.wheel_centre(q, i), self.mount(q, i)
-            J_C, J_A = self.point_jacobian(p_C, name), self.point_jacobian(p_A, "chassis")
-            length = np.linalg.norm(p_A - p_C)
-            along = (p_A - p_C) / length
-            rate = along @ (J_A - J_C) @ qd
-            stretch = length - data.mount_height
-            force = corner.preload - data.stiffness * stretch - data.damping * rate
-            total += J_A.T @ (force * along) - J_C.T @ (force * along)
+        for i, name in enumerate(CORNERS):
+            _, on_mount, _ = self.spring_and_damper(q, qd, i)
+            total += self.point_jacobian(self.mount(q, i), "chassis").T @ on_mount
+            total -= self.point_jacobian(self.wheel_centre(q, i), name).T @ on_mount
         for left, right in ((4, 5), (6, 7)):
             bar = self.corners[left - 4].axle.stabilizer_bar
             torque = bar.stiffness * (q[left] - q[right]) + bar.damping * (qd[left] - qd[right])
@@ -75,6 +81,17 @@ class MujocoCar(CarTree):
         if reaction == "chassis":
             force[4 + i] += torque
         return force
+
+    def pivot_force(self, q, qd, qdd, i, on_tyre):
+        """Force (3,) of arm i on the chassis at the pivot in E: Newton's law for the arm.
+
+        on_tyre (3,) : force of the road on the wheel in E
+        """
+        mass, name = self.corners[i].axle.wheel.mass, CORNERS[i]
+        p_G = self.on_arm(q, i, self.corners[i].p_G)
+        momentum = mass * self.point_acceleration(p_G, name, qd, qdd)
+        _, on_mount, _ = self.spring_and_damper(q, qd, i)
+        return on_tyre - on_mount - mass * GRAVITY * EZ - momentum
 
     def accelerations(
         self, q, qd, *, road_height, road_rate, drive, brake, lift_off=False

@@ -4,7 +4,6 @@ The engine does not appear here. What these tests leave open is only whether the
 documented ones; the tree, its energies and its Jacobians are checked by other means.
 """
 
-import mujoco
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -18,7 +17,7 @@ from ..factories import (
     random_road_state,
     random_vehicle,
 )
-from .car_tree import GRAVITY
+from .car_tree import CORNERS, GRAVITY
 from .mujoco_car import MujocoCar
 
 STILL = {name: np.zeros(4) for name in ("road_height", "road_rate", "drive", "brake")}
@@ -207,13 +206,30 @@ def test_wheel_centre_drift_is_the_rate_of_its_jacobian():
     """Oracle: MuJoCo's own dJ/dt qd, which the by-hand expression does not use."""
     for car, state in cars_and_states(20):
         car.place(state.q, state.qd)
-        mujoco.mj_comPos(car.model, car.data)
-        for i, name in enumerate(("fl", "fr", "rl", "rr")):
-            rate = np.zeros((3, 8))
-            centre, body = car.wheel_centre(state.q, i), car.model.body(name).id
-            mujoco.mj_jacDot(car.model, car.data, rate, None, centre, body)
+        for i, name in enumerate(CORNERS):
+            centre = car.wheel_centre(state.q, i)
+            rate = car.point_acceleration(centre, name, state.qd, np.zeros(8))
             drift = car.wheel_centre_drift(state.q, state.qd, i)
-            assert_allclose(drift, rate @ state.qd, rtol=0, atol=1e-12 * max(1, abs(drift).max()))
+            assert_allclose(drift, rate, rtol=0, atol=1e-12 * max(1, abs(drift).max()))
+
+
+def test_forces_on_the_chassis_accelerate_it():
+    """Oracle: Newton's law for the chassis alone, on mount and pivot forces and its weight."""
+    for car, state in cars_and_states(20):
+        q, qd, inputs = state.q, state.qd, state.inputs
+        qdd = car.accelerations(q, qd, **inputs)
+        loads = car.tyre_loads(q, qd, inputs["road_height"], inputs["road_rate"])
+        way = np.tanh(qd[0] / 0.1)
+        total = np.array([0.0, 0.0, -GRAVITY * car.vehicle.chassis.mass])
+        for i, corner in enumerate(car.corners):
+            torque = inputs["drive"][i] - inputs["brake"][i] * way
+            rolling = corner.axle.tyre.rolling_resistance * loads[i] * way
+            on_tyre = np.array([torque / corner.axle.wheel.radius - rolling, 0, loads[i]])
+            total += car.spring_and_damper(q, qd, i)[1]
+            total += car.pivot_force(q, qd, qdd, i, on_tyre)
+        momentum = car.vehicle.chassis.mass * np.array([qdd[0], 0, qdd[1]])
+        # Nothing moves sideways in this model: its Y balance is a constraint's reaction.
+        assert_allclose(total[[0, 2]], momentum[[0, 2]], rtol=0, atol=1e-11 * abs(momentum).max())
 
 
 @pytest.mark.parametrize("traction", ["exact", "paper"])
