@@ -1,0 +1,77 @@
+"""The text of a JSON file, parsed strictly: one value a key, finite numbers, a clear sentence."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from .errors import RideError
+
+LARGEST_FILE = 5_000_000
+"""Longest JSON file that is read, bytes; a fit with its histories fits in easily."""
+
+
+def read_json(path: Path, error: type[RideError]) -> Any:
+    """Parse a JSON file; whatever is wrong with it is raised as `error`, naming the file."""
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(LARGEST_FILE + 1)
+    except OSError as cause:
+        raise error(f"{path}: cannot be read ({cause.strerror}); check the path.") from cause
+    return parse_json(data, path.name, error)
+
+
+def parse_json(data: bytes, source: str, error: type[RideError]) -> Any:
+    """Parse the bytes of a JSON file; `source` heads every message."""
+    if len(data) > LARGEST_FILE:
+        raise error(
+            f"{source}: larger than {LARGEST_FILE // 1_000_000} MB; choose the right JSON file."
+        )
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as cause:
+        raise error(
+            f"{source}: not UTF-8 text (byte {cause.start + 1}); save it as JSON in UTF-8."
+        ) from cause
+    try:
+        content = json.loads(text, object_pairs_hook=_Object)
+        doubled = next(_doubled(content), None)
+    except json.JSONDecodeError as cause:
+        raise error(
+            f"{source}: line {cause.lineno}, column {cause.colno}: not valid JSON ({cause.msg});"
+            " correct it there or just before."
+        ) from cause
+    except (ValueError, RecursionError) as cause:
+        raise error(
+            f"{source}: nested too deeply or with an endless number; correct the file."
+        ) from cause
+    if doubled is not None:
+        raise error(f"{source}: {doubled} is given twice; keep one of them.")
+    return content
+
+
+class _Object(dict[str, Any]):
+    """A JSON object that remembers a key which appeared twice."""
+
+    def __init__(self, pairs: list[tuple[str, Any]]):
+        super().__init__(pairs)
+        self.doubled: str | None = None
+        if len(self) < len(pairs):
+            seen: set[str] = set()
+            for name, _ in pairs:
+                if name in seen:
+                    self.doubled = name
+                    return
+                seen.add(name)
+
+
+def _doubled(content: Any, path: str = "") -> Iterator[str]:
+    """Dotted paths of keys that appeared twice in one object."""
+    if isinstance(content, _Object):
+        if content.doubled is not None:
+            yield path + content.doubled
+        for name, value in content.items():
+            yield from _doubled(value, f"{path}{name}.")
+    elif isinstance(content, list):
+        for index, value in enumerate(content):
+            yield from _doubled(value, f"{path.removesuffix('.')}[{index}].")
