@@ -142,12 +142,17 @@ PARAMETER_NAMES: tuple[str, ...] = tuple(row.name for row in PARAMETERS)
 
 
 def parameter(name: str) -> Parameter:
-    """The row of the parameter with this name or symbol."""
-    for row in PARAMETERS:
-        if name in (row.name, row.symbol):
-            return row
-    near = get_close_matches(name, (*PARAMETER_NAMES, *(row.symbol for row in PARAMETERS)), n=1)
-    hint = f"did you mean {near[0]}?" if near else f"the twelve are {', '.join(PARAMETER_NAMES)}."
+    """The row of the parameter with this name or symbol, in any case."""
+    known = {key.lower(): row for row in PARAMETERS for key in (row.name, row.symbol)}
+    row = known.get(name.lower())
+    if row is not None:
+        return row
+    near = get_close_matches(name.lower(), known, n=1)
+    if near:
+        row = known[near[0]]
+        hint = f"did you mean {row.name if '.' in near[0] else row.symbol}?"
+    else:
+        hint = f"the twelve are {', '.join(PARAMETER_NAMES)}."
     raise ParameterError(f"No parameter is called {name!r}; {hint}")
 
 
