@@ -1,0 +1,280 @@
+"""A table of numbers in a text file, as spreadsheets and test benches write them.
+
+Read are UTF-8 (with or without its mark), UTF-16 and UTF-32; commas, semicolons or tabs between
+the columns, the last two also with decimal commas; quotes, blank lines, Excel's `sep=` line and
+any line ending. The file is read as a stream and its numbers by numpy, so memory is that of the
+numbers. Only when numpy refuses, or reads something that is not finite, is the file gone through
+once more to name the first bad cell.
+"""
+
+import csv
+import io
+import math
+import re
+from collections.abc import Iterator, Sequence
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import MeasurementError
+
+LARGEST_FILE = 200_000_000
+"""Longest file that is read, bytes."""
+
+MOST_COLUMNS = 1000
+"""Most columns a file may have."""
+
+MOST_NUMBERS = 25_000_000
+"""Most numbers read from one file: samples times columns in use; 200 MB of memory."""
+
+LONGEST_HEADER = 200_000
+"""Longest header line, characters."""
+
+_HEAD = 65_536
+_CONTROL = re.compile(rb"[\x00-\x08\x0e-\x19\x1b-\x1f]")
+_NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
+_SEPARATOR_LINE = re.compile(r'"?sep=(.)"?\s*', re.IGNORECASE)
+_MARKS = (
+    (b"\xff\xfe\x00\x00", "utf-32"),
+    (b"\x00\x00\xfe\xff", "utf-32"),
+    (b"\xff\xfe", "utf-16"),
+    (b"\xfe\xff", "utf-16"),
+)
+
+
+class CsvTable:
+    """The header of a text file and, on demand, the numbers below it.
+
+    header : texts of the header's cells, trailing empty ones left off
+    Raises MeasurementError naming the file, the line and the column, with the remedy.
+    """
+
+    def __init__(self, stream: BinaryIO, source: str):
+        self._stream = stream
+        self._source = source
+        self._encoding = self._find_encoding()
+        self._delimiter, self._header_line, self.header = self._read_header()
+        self._blank = self._delimiter + " \t\r\n\x1a\ufeff"
+
+    def numbers(self, columns: Sequence[int]) -> NDArray[np.float64]:
+        """The numbers of some columns, (samples, len(columns)), all finite."""
+        columns = list(columns)
+        rows = self._rows(columns)
+        first = next(rows, None)
+        if first is None:
+            raise self._refuse("there are no samples below the header; export the data with it")
+        try:
+            table = np.loadtxt(
+                self._limited(first, rows, len(columns)),
+                delimiter=self._delimiter,
+                comments=None,
+                usecols=columns,
+                ndmin=2,
+            )
+        except ValueError as error:
+            raise self._bad_cell(columns) from error
+        if not np.isfinite(table).all():
+            raise self._bad_cell(columns)
+        return table
+
+    def line_of(self, row: int) -> int:
+        """The line of the file that holds a row of `numbers`, both as it counts them (row from 0)."""
+        for index, (line, _) in enumerate(self._rows([])):
+            if index == row:
+                return line
+        raise IndexError(row)
+
+    def _refuse(self, sentence: str, line: int | None = None) -> MeasurementError:
+        place = f"{self._source}: " if line is None else f"{self._source}: line {line}"
+        return MeasurementError(f"{place}{sentence}.")
+
+    def _find_encoding(self) -> str:
+        self._stream.seek(0)
+        head = self._stream.read(_HEAD)
+        if not head.strip():
+            raise self._refuse("the file is empty; export the recording again")
+        for mark, encoding in _MARKS:
+            if head.startswith(mark):
+                return encoding
+        if head.count(0) > 0.3 * len(head) and not _CONTROL.search(head.replace(b"\0", b"")):
+            return "utf-16-le" if head[1::2].count(0) > head[0::2].count(0) else "utf-16-be"
+        if head.startswith(b"PK\x03\x04"):
+            raise self._refuse(
+                "this is a workbook or a zip archive, not text; save the sheet as CSV"
+            )
+        if _CONTROL.search(head):
+            raise self._refuse("this is a binary file, not text; export the recording as CSV")
+        return "utf-8-sig"
+
+    def _text(self) -> io.TextIOWrapper:
+        self._stream.seek(0)
+        strict = self._encoding == "utf-8-sig"
+        errors = "surrogateescape" if strict else "replace"
+        return io.TextIOWrapper(self._stream, self._encoding, errors, newline=None)
+
+    def _lines(self) -> Iterator[tuple[int, str]]:
+        """Every line of the file with its number, counted from 1."""
+        text = self._text()
+        try:
+            yield from enumerate(text, start=1)
+        finally:
+            text.detach()
+
+    def _read_header(self) -> tuple[str, int, list[str]]:
+        """The delimiter, the header's line number and its cells."""
+        text, number, delimiter = self._text(), 0, None
+        try:
+            while line := text.readline(LONGEST_HEADER + 1):
+                number += 1
+                if len(line) > LONGEST_HEADER:
+                    raise self._refuse(
+                        f": the line is longer than {LONGEST_HEADER} characters; export fewer"
+                        " columns, one row a sample",
+                        number,
+                    )
+                if separator := _SEPARATOR_LINE.fullmatch(line):
+                    delimiter = separator[1]
+                elif line.strip():
+                    break
+        finally:
+            text.detach()
+        line = _mended(line)
+        if not line.strip():
+            raise self._refuse("the file holds blank lines only; export the recording again")
+        if delimiter is None:
+            bare = re.sub(r'"[^"]*"', "", line)
+            delimiter = max(",;\t", key=bare.count)
+        cells = [
+            cell.strip() for cell in next(csv.reader([line.rstrip("\n")], delimiter=delimiter))
+        ]
+        while cells and not cells[-1]:
+            cells.pop()
+        if len(cells) > MOST_COLUMNS:
+            raise self._refuse(
+                f" names {len(cells)} columns, more than {MOST_COLUMNS}; export fewer", number
+            )
+        return delimiter, number, cells
+
+    def _limited(
+        self, first: tuple[int, str], rows: Iterator[tuple[int, str]], width: int
+    ) -> Iterator[str]:
+        """The text of the rows, ended with an error where they would take too much memory."""
+        yield first[1]
+        most = MOST_NUMBERS // max(width, 1)
+        for count, (line, text) in enumerate(rows, start=2):
+            if count > most:
+                raise self._refuse(
+                    f": more than {most} samples of {width} columns; cut the recording or thin it"
+                    " out",
+                    line,
+                )
+            yield text
+
+    def _rows(self, used: Sequence[int]) -> Iterator[tuple[int, str]]:
+        """Line number and text of every row with data, quotes and decimal commas resolved."""
+        delimiter, blank, width = self._delimiter, self._blank, len(self.header)
+        commas = delimiter != ","
+        for number, line in self._lines():
+            if number <= self._header_line or not line.strip(blank):
+                continue
+            if '"' in line:
+                line = self._unquoted(number, line, used)
+            if commas and "," in line:
+                line = self._pointed(number, line, used)
+            if line.count(delimiter) != width - 1:
+                self._require_width(number, line)
+            yield number, line
+
+    def _unquoted(self, number: int, line: str, used: Sequence[int]) -> str:
+        """A line with its quotes taken off; a comma between quotes would be an ambiguous number."""
+        cells = next(csv.reader([line.rstrip("\n")], delimiter=self._delimiter), [])
+        for index, cell in enumerate(cells):
+            if self._delimiter in cell:
+                if index in used:
+                    raise self._bad_number(
+                        number, index, cell, "write numbers with a decimal point and no other sign"
+                    )
+                cells[index] = ""
+        return self._delimiter.join(cells) + "\n"
+
+    def _pointed(self, number: int, line: str, used: Sequence[int]) -> str:
+        """A line with decimal points for its decimal commas, if it has no points already."""
+        if "." in line:
+            cells = line.split(self._delimiter)
+            for index in used:
+                if index < len(cells) and "." in cells[index]:
+                    raise self._bad_number(
+                        number,
+                        index,
+                        cells[index],
+                        "the line mixes decimal commas and points; write one of them and no"
+                        " thousands separators",
+                    )
+        return line.replace(",", ".")
+
+    def _require_width(self, number: int, line: str) -> None:
+        """Refuse a row with another number of cells than the header; empty ones may trail."""
+        cells, width = line.split(self._delimiter), len(self.header)
+        if len(cells) > width and not any(cell.strip() for cell in cells[width:]):
+            return
+        hint = ""
+        if self._delimiter == "," and len(cells) > width:
+            hint = " (with decimal commas, separate the columns by semicolons)"
+        raise self._refuse(
+            f" holds {len(cells)} cells where the header names {width} columns; complete the line"
+            f" or remove it{hint}",
+            number,
+        )
+
+    def _bad_cell(self, columns: Sequence[int]) -> MeasurementError:
+        """The sentence about the first cell that holds no finite number."""
+        for number, line in self._rows(columns):
+            cells = line.split(self._delimiter)
+            for index in columns:
+                cell = cells[index].strip()
+                if not cell:
+                    return self._refuse(
+                        f", column {self._title(index)}: the cell is empty; fill it or remove the"
+                        " line (samples need not be evenly spaced)",
+                        number,
+                    )
+                if cell.lower().lstrip("+-") in ("nan", "inf", "infinity"):
+                    return self._bad_number(
+                        number,
+                        index,
+                        cell,
+                        "repair it or remove the line (samples need not be evenly spaced)",
+                        "not finite",
+                    )
+                if not _NUMBER.fullmatch(cell):
+                    return self._bad_number(number, index, cell, "write a plain decimal number")
+                if math.isinf(float(cell)):
+                    return self._bad_number(
+                        number, index, cell, "correct it or remove the line", "too large"
+                    )
+        return self._refuse("the numbers cannot be read; export the recording again")
+
+    def _bad_number(
+        self, line: int, index: int, cell: str, remedy: str, what: str = "not a number"
+    ) -> MeasurementError:
+        text = ascii(cell.strip())
+        text = text if len(text) <= 32 else f"{text[:28]}...'"
+        return self._refuse(f", column {self._title(index)}: {text} is {what}; {remedy}", line)
+
+    def _title(self, index: int) -> str:
+        return self.header[index] or f"number {index + 1}"
+
+
+def _mended(line: str) -> str:
+    """A header line in which bytes that are not UTF-8 are read as Windows wrote them."""
+    try:
+        line.encode("utf-8")
+    except UnicodeEncodeError:
+        return line.encode("utf-8", "surrogateescape").decode("cp1252", "replace")
+    return line
+
+
+def is_number(text: str) -> bool:
+    """Whether a cell holds a plain decimal number, with a decimal point or comma."""
+    return bool(_NUMBER.fullmatch(text.replace(",", ".")))
