@@ -1,0 +1,184 @@
+"""Simulations of whole cars: batches, forces, accelerations at points, starts and failures."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from ridetune.engine.car_rows import car_rows
+from ridetune.engine.channels import Run
+from ridetune.engine.errors import SimulationDiverged, SimulationError
+from ridetune.engine.frames import CORNERS, GRAVITY
+from ridetune.engine.integration import free_states
+from ridetune.engine.manoeuvre import reference_manoeuvres
+from ridetune.engine.rims import prepare
+from ridetune.engine.road import Road
+from ridetune.engine.simulation import (
+    rims_batch,
+    simulate_posts,
+    simulate_rims,
+    simulate_road,
+)
+from ridetune.engine.stepping import prepare_free
+from ridetune.engine.vehicle_file import reference_vehicles
+
+PLACES = ("mount", "pivot")
+STIFFNESSES = np.linspace(18000.0, 32000.0, 65)
+
+
+@pytest.fixture(scope="module")
+def car():
+    return reference_vehicles()["paper"]
+
+
+@pytest.fixture(scope="module")
+def short_drive():
+    return replace(reference_manoeuvres()["2"], duration=7.0)
+
+
+@pytest.fixture(scope="module")
+def driven(car, short_drive):
+    return simulate_road(car, short_drive).run
+
+
+def cars(car, count):
+    return [car.with_values({"front.suspension.stiffness": float(k)}) for k in STIFFNESSES[:count]]
+
+
+@pytest.mark.parametrize("count", [2, 7, 8, 9, 65])
+def test_a_batch_gives_each_cars_single_result(car, short_drive, count):
+    """Oracle: the same car alone. Lanes contract products differently: rounding only."""
+    inputs = prepare_free(short_drive.demand(car), 0.002, 0.1)
+    rows = car_rows(cars(car, count))
+    batch = free_states(rows, inputs).values
+    alone = np.concatenate([free_states(row[np.newaxis], inputs).values for row in rows])
+    assert_allclose(batch, alone, rtol=0, atol=1e-11)
+
+
+def test_a_batch_on_rims_gives_each_cars_single_result(car, driven):
+    inputs = prepare(driven, car)
+    batch = rims_batch(cars(car, 9), inputs, "exact")
+    alone = np.concatenate([rims_batch([one], inputs, "exact") for one in cars(car, 9)])
+    assert_allclose(batch, alone, rtol=0, atol=1e-11)
+
+
+def test_mounts_and_pivots_carry_the_sprung_mass(car):
+    """Oracle: Newton's second law of the chassis alone along its own axes, on a symmetric road.
+
+    sum(mount + pivot) = m_s R^T (a_x, 0, z'' + g). Without roll the lateral reaction of the
+    guided chassis has no part along these axes.
+    """
+    bump = reference_manoeuvres()["bump"]
+    run = simulate_road(car, bump, points={"point.cg": (0.0, 0.0, 0.0)}).run
+    force_x, force_z = (
+        sum(run[f"{place}.{corner}.force_{axis}"] for place in PLACES for corner in CORNERS)
+        for axis in "xz"
+    )
+    sin, cos = np.sin(run["chassis.pitch"]), np.cos(run["chassis.pitch"])
+    forward, upward = run["chassis.a_x"], run["point.cg.a_z"] + GRAVITY
+    mass = car.chassis.mass
+    tolerance = 1e-12 * mass * GRAVITY * len(CORNERS)
+    assert_allclose(force_x, mass * (cos * forward - sin * upward), rtol=0, atol=tolerance)
+    assert_allclose(force_z, mass * (sin * forward + cos * upward), rtol=0, atol=tolerance)
+
+
+def test_tyres_carry_the_whole_cars_inertia(car, driven):
+    """Oracle: momentum balance along Z, m z'' of every body from the wheels' and chassis's motion.
+
+    Integrated over the run: sum of loads less weight equals the change of vertical momentum. The
+    arms' CG is at the wheel centre, so their momentum is m_i times the wheel's rise rate.
+    Trapezoidal rule at 5 ms on a 12 Hz hop: relative error (w h)^2/12 = 1.2 % of the hop's part.
+    """
+    time = driven.time
+    load = sum(driven[f"tyre.{corner}.load"] for corner in CORNERS) - car.total_mass * GRAVITY
+    impulse = np.concatenate([[0.0], np.cumsum(0.5 * (load[1:] + load[:-1]) * np.diff(time))])
+    momentum = car.chassis.mass * driven["chassis.z_rate"] + sum(
+        car.axle_at(corner).wheel.mass * np.gradient(driven[f"wheel.{corner}.z"], time)
+        for corner in CORNERS
+    )
+    inner = slice(2, -2)
+    assert_allclose(impulse[inner], momentum[inner], atol=0.02 * np.ptp(momentum))
+
+
+def test_acceleration_at_a_seat_is_the_second_derivative_of_its_path(car, driven):
+    """Oracle: second differences of the seat's height, whose error is h^2/12 of the fourth
+    derivative: (w h)^2/12 = 1.2 % at 12 Hz, and less where the chassis moves slowly."""
+    height = driven["chassis.z"] + (
+        0.15 * np.sin(driven["chassis.pitch"])
+        + np.cos(driven["chassis.pitch"])
+        * (0.37 * np.sin(driven["chassis.roll"]) + 0.05 * np.cos(driven["chassis.roll"]))
+    )
+    h = driven.sample_step
+    expected = (height[2:] - 2.0 * height[1:-1] + height[:-2]) / h**2
+    seat = driven["seat.driver.a_z"]
+    assert_allclose(seat[1:-1], expected, rtol=0, atol=0.02 * np.abs(seat).max())
+
+
+def test_a_raised_rig_lifts_the_car_without_moving_the_suspension(car):
+    """Oracle: rigid translation."""
+    time = np.linspace(0.0, 1.0, 101)
+    posts = {f"post.{corner}.z": np.full(time.size, 0.02) for corner in CORNERS}
+    run = simulate_posts(car, Run("raised", time, posts)).run
+    assert_allclose(run["chassis.z"], 0.02, atol=1e-9)
+    for corner in CORNERS:
+        assert_allclose(run[f"suspension.{corner}.travel"], 0.0, atol=1e-9)
+
+
+def test_a_car_stands_on_a_tilted_start_in_equilibrium(car):
+    """Oracle: accelerations at the start vanish, and each side's tyres follow its height."""
+    x = np.arange(-10.0, 30.0, 0.5)
+    road = Road(-10.0, 0.5, np.full(x.size, 0.01), np.zeros(x.size))
+    standing = replace(reference_manoeuvres()["coast"], duration=1.0, initial_speed=0.0)
+    run = simulate_road(car, standing, road=road).run
+    assert abs(run["seat.driver.a_z"]).max() < 1e-7
+    # Left tyres up by 10 mm on a 1.5 m track: roll of the ground 0.38 deg, the body rolls less
+    # than twice that and in the same sense.
+    assert 0.01 / 1.51 * 0.9 < run["chassis.roll"][0] < 2 * 0.01 / 1.50
+
+
+def test_lift_off_keeps_loads_positive_and_reports_the_share_of_time_without_contact(car):
+    bump = reference_manoeuvres()["bump"]
+    pulled = simulate_road(car, bump)
+    free = simulate_road(car, bump, lift_off=True)
+    assert min(pulled.run[f"tyre.{c}.load"].min() for c in CORNERS) < 0.0
+    assert min(free.run[f"tyre.{c}.load"].min() for c in CORNERS) == 0.0
+    assert pulled.negative_load_share["fl"] > 0.0
+    assert free.negative_load_share["fl"] > 0.0
+
+
+def test_divergence_names_time_and_coordinate(car):
+    """A pothole a hundred times too deep throws the car over."""
+    x = np.arange(0.0, 100.0, 0.25)
+    depth = np.where((x > 20.0) & (x < 25.0), -30.0, 0.0)
+    road = Road(0.0, 0.25, depth, np.zeros(x.size))
+    with pytest.raises(SimulationDiverged, match=r"diverged at t = \d+\.\d+ s in \w+\.") as caught:
+        simulate_road(car, reference_manoeuvres()["bump"], road=road)
+    assert caught.value.time > 0.0
+
+
+def test_rims_out_of_reach_are_named(car, driven):
+    """Wheel heights in mm read as m cannot be reached by an arm of 1 m."""
+    wheels = {
+        name: 1000.0 * values if name.startswith("wheel") else values
+        for name, values in driven.channels.items()
+    }
+    with pytest.raises(SimulationDiverged, match="wheel centre cannot reach"):
+        simulate_rims(car, Run("wrong unit", driven.time, wheels))
+
+
+def test_modes_refuse_each_others_manoeuvres(car):
+    manoeuvres = reference_manoeuvres()
+    with pytest.raises(SimulationError, match="posts mode"):
+        simulate_road(car, manoeuvres["heave"])
+    with pytest.raises(SimulationError, match="road mode"):
+        simulate_posts(car, manoeuvres["2"])
+    with pytest.raises(SimulationError, match="lacks post.fl.z"):
+        simulate_posts(car, Run("none", np.array([0.0, 1.0]), {}))
+
+
+def test_rims_fed_back_reproduce_the_chassis(car, driven):
+    """Oracle: the direct run itself. Between them: a_x low-passed at 20 Hz, splines at 5 ms."""
+    fit = simulate_rims(car, driven).fit_percent
+    assert min(fit[name] for name in ("chassis.z", "chassis.pitch", "chassis.roll")) > 99.9
+    assert min(fit[f"suspension.{corner}.travel"] for corner in CORNERS) > 99.9
+    assert min(fit[f"tyre.{corner}.load"] for corner in CORNERS) > 95.0
