@@ -76,20 +76,17 @@ def prepare_free(demand: Demand, step: float, sample_step: float) -> FreeInputs:
     samples[first_step[sampled]] = np.arange(time.size)
     within = np.arange(steps.size) - np.repeat(first_step[:-1], parts)
     begin = np.repeat(boundaries[:-1], parts) + within * steps
-    stages = np.stack(
-        [
-            _acting(demand, begin, "right"),
-            _acting(demand, begin + 0.5 * steps, "right"),
-            _acting(demand, begin + steps, "left"),
-        ],
-        axis=1,
-    )
+    acting = _Acting(demand)
+    stages = np.empty((steps.size, 3, 16))
+    stages[:, 0] = acting(begin, "right")
+    stages[:, 1] = acting(begin + 0.5 * steps, "right")
+    stages[:, 2] = acting(begin + steps, "left")
     return FreeInputs(
         time,
         steps,
         samples,
-        np.ascontiguousarray(stages),
-        _acting(demand, time, "left"),
+        stages,
+        acting(time, "left"),
         demand.road or Road.flat(),
         demand.initial_speed,
     )
@@ -112,17 +109,26 @@ def _boundaries(
     return boundaries, np.searchsorted(boundaries, time)
 
 
-def _acting(demand: Demand, time: NDArray[np.float64], side) -> NDArray[np.float64]:
-    """Post heights, their rates, drive and brake torques at given times, (n, 16)."""
-    if demand.posts is None:
-        height = rate = np.zeros((time.size, 4))
-    else:
-        posts = demand.posts
-        spline = CubicSpline(posts.time, posts.height)
-        held = np.clip(time, posts.time[0], posts.time[-1])
-        height = spline(held)
-        rate = np.where((held == time)[:, np.newaxis], spline(held, 1), 0.0)
-    # Rounding must not carry a stage across the jump at its step's end.
-    nudge = -_SAME_INSTANT if side == "left" else _SAME_INSTANT
-    drive, brake = (torque.at(time + nudge, side) for torque in (demand.drive, demand.brake))
-    return np.concatenate([height, rate, drive, brake], axis=1)
+class _Acting:
+    """What a demand does to the car at any time."""
+
+    def __init__(self, demand: Demand):
+        self.torques = (demand.drive, demand.brake)
+        self.posts = demand.posts
+        if self.posts is not None:
+            self.height = CubicSpline(self.posts.time, self.posts.height)
+            self.rate = self.height.derivative()
+
+    def __call__(self, time: NDArray[np.float64], side) -> NDArray[np.float64]:
+        """Post heights, their rates, drive and brake torques at given times, (n, 16)."""
+        acting = np.zeros((time.size, 16))
+        if self.posts is not None:
+            held = np.clip(time, self.posts.time[0], self.posts.time[-1])
+            acting[:, :4] = self.height(held)
+            acting[:, 4:8] = np.where((held == time)[:, np.newaxis], self.rate(held), 0.0)
+        # Rounding must not carry a stage across the jump at its step's end.
+        nudge = -_SAME_INSTANT if side == "left" else _SAME_INSTANT
+        for torque, columns in zip(self.torques, (slice(8, 12), slice(12, 16)), strict=True):
+            if np.any(torque.values):
+                acting[:, columns] = torque.at(time + nudge, side)
+        return acting
