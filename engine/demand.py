@@ -88,11 +88,12 @@ class Demand:
 
 @dataclass(frozen=True, eq=False)
 class PointMassMotion:
-    """Distance x (m) and speed v (m/s) of the car as a point mass at uniform times, shape (n,)."""
+    """The car as a point mass at uniform times (n,): distance m, speed m/s, acceleration m/s2."""
 
     time: NDArray[np.float64]
     x: NDArray[np.float64]
     v: NDArray[np.float64]
+    a: NDArray[np.float64]
 
     def distance(self, t: float) -> float:
         """x at time t, m."""
@@ -112,9 +113,9 @@ def point_mass_motion(
     brake: PiecewiseLinear,
     initial_speed: float,
     duration: float,
-    step: float = 0.01,
+    steps: int = 2000,
 ) -> PointMassMotion:
-    """Motion of the car's mass along X under given torques from x = 0, every `step` seconds."""
+    """Motion of the car's mass along X under given torques from x = 0 at steps + 1 times."""
     per_mass = np.array([1.0 / vehicle.axle_at(c).wheel.radius for c in CORNERS])
     per_mass /= vehicle.total_mass
     knots = np.union1d(drive.knots, brake.knots)
@@ -125,7 +126,6 @@ def point_mass_motion(
         pieces.append(tuple((torque.at(ends[:-1], "right") @ per_mass).tolist()))
         pieces.append(tuple((torque.at(ends[1:], "left") @ per_mass).tolist()))
     rolling = rolling_resistance(vehicle) * GRAVITY
-    steps = max(round(duration / step), 1)
     return _point_mass(tuple(ends.tolist()), *pieces, rolling, initial_speed, steps)
 
 
@@ -145,22 +145,29 @@ def _point_mass(
     The suspension's parameters play no part, so moving a slider finds the motion in the cache.
     """
     time = np.linspace(0.0, ends[-1], steps + 1)
-    states = np.empty((2, time.size))
+    states = np.empty((3, time.size))
     state = np.array([0.0, initial_speed])
     for i, (begin, end) in enumerate(zip(ends, ends[1:], strict=False)):
 
-        def rate(t, y):
+        def rate_of_speed(t, v):
             share = (t - begin) / (end - begin)
             drive = drive_begin[i] + share * (drive_end[i] - drive_begin[i])
             brake = brake_begin[i] + share * (brake_end[i] - brake_begin[i])
-            return [y[1], drive - math.tanh(y[1] / REST_SPEED) * (brake + rolling)]
+            return drive - math.tanh(v / REST_SPEED) * (brake + rolling)
 
         solution = solve_ivp(
-            rate, (begin, end), state, method="LSODA", rtol=1e-8, atol=1e-9, dense_output=True
+            lambda t, y: [y[1], rate_of_speed(t, y[1])],
+            (begin, end),
+            state,
+            method="LSODA",
+            rtol=1e-8,
+            atol=1e-9,
+            dense_output=True,
         )
         inside = (time >= begin) & (time <= end)
-        states[:, inside] = solution.sol(time[inside])
+        states[:2, inside] = solution.sol(time[inside])
+        states[2, inside] = np.vectorize(rate_of_speed)(time[inside], states[1, inside])
         state = solution.y[:, -1]
     states.flags.writeable = False
     time.flags.writeable = False
-    return PointMassMotion(time, states[0], states[1])
+    return PointMassMotion(time, *states)
