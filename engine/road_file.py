@@ -1,0 +1,158 @@
+"""Road files: CSV with the columns `x [m]`, `left [m]` and `right [m]`, in any order and unit.
+
+X need not be uniform: a C2 spline through the points is sampled on a uniform grid whose spacing is
+the file's least one. X = 0 is where the car's CG stands at the start. Heights count from the
+road's beginning (the mean of both tracks there), so a survey's elevations above the sea do as well.
+"""
+
+import io
+import re
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from .csv_table import LARGEST_FILE, CsvTable
+from .errors import MeasurementError, RoadError
+from .road import Road
+from .units import UnitError, to_si
+
+COLUMNS = ("x", "left", "right")
+
+FEWEST_POINTS = 3
+"""Fewest points of a road file."""
+
+LONGEST = 100_000.0
+"""Longest road that is read, m."""
+
+MOST_POINTS = 1_000_000
+"""Most points of the uniform grid; 64 MB of spline coefficients."""
+
+TALLEST = 20.0
+"""Greatest height (m) above or below the road's beginning: beyond it, a unit is wrong."""
+
+UNIFORM_TOLERANCE = 1e-3
+"""X that is within this share of a step of a uniform grid counts as uniform."""
+
+_TITLE = re.compile(r"\s*(?P<name>\w+)\s*(?:[\[(]\s*(?P<unit>.*?)\s*[\])])?\s*")
+
+
+def read_road(path: str | Path) -> Road:
+    """Read a road file; raises RoadError with the file, the place and the remedy."""
+    path = Path(path)
+    if path.suffix.lower() == ".crg":
+        raise RoadError(
+            f"{path.name}: OpenCRG files are not read; export the two wheel tracks as CSV with the"
+            " columns x [m],left [m],right [m]."
+        )
+    try:
+        with path.open("rb") as stream:
+            return _road(stream, path.name)
+    except OSError as error:
+        raise RoadError(
+            f"{path}: the road file cannot be read ({error.strerror}); check the path."
+        ) from error
+
+
+def parse_road(data: bytes, name: str) -> Road:
+    """Read the bytes of a road file; `name` heads every message."""
+    return _road(io.BytesIO(data), name)
+
+
+def _road(stream: BinaryIO, source: str) -> Road:
+    if stream.seek(0, io.SEEK_END) > LARGEST_FILE:
+        raise RoadError(
+            f"{source}: the file has more than {LARGEST_FILE / 1e6:.0f} MB; cut the road or thin"
+            " it out."
+        )
+    try:
+        table = CsvTable(stream, source)
+        columns = _columns(table.header, source)
+        numbers = table.numbers([index for index, _ in columns])
+    except MeasurementError as error:
+        raise RoadError(str(error)) from error
+    x, left, right = (factor * numbers[:, i] for i, (_, factor) in enumerate(columns))
+    if x.size < FEWEST_POINTS:
+        raise RoadError(
+            f"{source}: the file holds {x.size} points, at least {FEWEST_POINTS} are needed; give"
+            " the profile more points."
+        )
+    steps = np.diff(x)
+    if not np.all(steps > 0.0):
+        line = table.line_of(int(np.argmin(steps > 0.0)) + 1)
+        raise RoadError(
+            f"{source}: line {line}: x does not increase; sort the points by x and remove doubled"
+            " ones."
+        )
+    beginning = 0.5 * (left[0] + right[0])
+    left, right = left - beginning, right - beginning
+    _check_magnitudes(x, left, right, source)
+    grid, spacing = _uniform_grid(x, source)
+    if grid is x:
+        return Road(float(x[0]), spacing, left, right, name=source)
+    heights = CubicSpline(x, np.column_stack([left, right]), bc_type="clamped")(grid)
+    return Road(float(x[0]), spacing, heights[:, 0], heights[:, 1], name=source)
+
+
+def _columns(header: list[str], source: str) -> list[tuple[int, float]]:
+    """Index and factor to metres of the columns x, left and right."""
+    found: dict[str, tuple[int, float]] = {}
+    for index, title in enumerate(header):
+        match = _TITLE.fullmatch(title)
+        name = match["name"].lower() if match else ""
+        if name not in COLUMNS:
+            continue
+        if name in found:
+            raise RoadError(
+                f"{source}: columns {found[name][0] + 1} and {index + 1} are both {name}; keep one"
+                " of them."
+            )
+        try:
+            factor, _ = to_si((match and match["unit"]) or "m", "m")
+        except UnitError as error:
+            raise RoadError(
+                f"{source}: column {index + 1} ({title}): {error}; write a length such as"
+                f" {name} [m]."
+            ) from error
+        found[name] = (index, factor)
+    missing = [name for name in COLUMNS if name not in found]
+    if missing:
+        raise RoadError(
+            f"{source}: there is no column {' or '.join(missing)}; begin the file with the line"
+            " x [m],left [m],right [m]."
+        )
+    return [found[name] for name in COLUMNS]
+
+
+def _check_magnitudes(x: NDArray, left: NDArray, right: NDArray, source: str) -> None:
+    """Raise RoadError for a road so long or so high that its unit must be wrong."""
+    if x[-1] - x[0] > LONGEST:
+        raise RoadError(
+            f"{source}: the road is {x[-1] - x[0]:g} m long, more than {LONGEST:g} m; check the"
+            " unit of x or cut the road."
+        )
+    for name, heights in (("left", left), ("right", right)):
+        highest = float(np.max(np.abs(heights)))
+        if highest > TALLEST:
+            raise RoadError(
+                f"{source}: {name} rises or falls by {highest:g} m, more than {TALLEST:g} m; check"
+                f" its unit, e.g. {name} [mm]."
+            )
+
+
+def _uniform_grid(x: NDArray, source: str) -> tuple[NDArray, float]:
+    """The file's own x where it is uniform, else a uniform grid as fine as its closest points."""
+    steps = np.diff(x)
+    mean = float(x[-1] - x[0]) / (x.size - 1)
+    if np.max(np.abs(x - np.linspace(x[0], x[-1], x.size))) <= UNIFORM_TOLERANCE * mean:
+        return x, mean
+    cells = int(np.ceil((x[-1] - x[0]) / steps.min()))
+    if cells > MOST_POINTS:
+        raise RoadError(
+            f"{source}: points as close as {steps.min():g} m would make {cells} cells of the whole"
+            f" road, more than {MOST_POINTS}; thin out the closest points."
+        )
+    grid = np.linspace(x[0], x[-1], cells + 1)
+    return grid, float(grid[1] - grid[0])
