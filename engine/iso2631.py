@@ -12,6 +12,7 @@ for 5 ms samples is f2 itself. The record counts as zero before its beginning an
 appended so that the filter's end does not wrap around into the beginning.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -79,7 +80,7 @@ def _resonance(s: NDArray, corner: float, quality: float) -> NDArray:
 def weighted(acceleration: Array, step: float, weighting: Weighting) -> Array:
     """The weighted history of an acceleration (n,) sampled every `step` seconds."""
     count = acceleration.size
-    size = next_fast_len(count + int(np.ceil(SETTLING / step)), real=True)
+    size = int(next_fast_len(count + math.ceil(SETTLING / step), real=True) or 0)
     spectrum = np.fft.rfft(acceleration, size)
     return np.fft.irfft(spectrum * response(weighting, np.fft.rfftfreq(size, step)), size)[:count]
 

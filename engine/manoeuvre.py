@@ -8,7 +8,6 @@ The keys of each part are the fields of the record of that kind in `torque_laws`
 `post_sweep`; unknown ones are refused with the nearest known name.
 """
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -18,6 +17,7 @@ from typing import Annotated, Any, Literal
 from .demand import Demand, PiecewiseLinear, PointMassMotion, PostMotion, point_mass_motion
 from .errors import ManoeuvreError
 from .json_record import RecordReader, record_to_json
+from .json_text import read_json
 from .post_sweep import PostSweep
 from .road_specs import FlatRoad, Place, RoadSpec
 from .torque_laws import LONGEST, BrakeLaw, DriveLaw, Speed
@@ -33,9 +33,6 @@ __all__ = [
     "read_manoeuvre",
     "reference_manoeuvres",
 ]
-
-LARGEST_FILE = 5_000_000
-"""Longest manoeuvre file that is read, bytes."""
 
 ROAD_MARGIN = 0.02
 """The road is longer than the point mass's way by this share and 10 m: the car's own way differs
@@ -121,38 +118,7 @@ def manoeuvre_to_json(manoeuvre: Manoeuvre) -> dict[str, Any]:
 def read_manoeuvre(path: str | Path) -> Manoeuvre:
     """Read a manoeuvre file; raises ManoeuvreError naming the file, the place and the remedy."""
     path = Path(path)
-    try:
-        with path.open("rb") as stream:
-            text = stream.read(LARGEST_FILE + 1)
-    except OSError as error:
-        raise ManoeuvreError(
-            f"{path}: the manoeuvre file cannot be read ({error.strerror}); check the path."
-        ) from error
-    return manoeuvre_from_text(text, path.name)
-
-
-def manoeuvre_from_text(data: bytes, source: str = "manoeuvre") -> Manoeuvre:
-    """Parse and check the bytes of a manoeuvre file."""
-    if len(data) > LARGEST_FILE:
-        raise ManoeuvreError(
-            f"{source}: the file is larger than {LARGEST_FILE // 1_000_000} MB, which no manoeuvre"
-            " is; choose the manoeuvre's JSON file."
-        )
-    try:
-        content = json.loads(data.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        raise ManoeuvreError(
-            f"{source}: the file is not UTF-8 text (byte {error.start + 1}); save it as JSON in"
-            " UTF-8."
-        ) from error
-    except json.JSONDecodeError as error:
-        raise ManoeuvreError(
-            f"{source}: line {error.lineno}, column {error.colno}: not valid JSON ({error.msg});"
-            " correct it there or just before."
-        ) from error
-    except (ValueError, RecursionError) as error:
-        raise ManoeuvreError(f"{source}: not a usable JSON file ({error}); correct it.") from error
-    return manoeuvre_from_json(content, source)
+    return manoeuvre_from_json(read_json(path, ManoeuvreError), path.name)
 
 
 @cache

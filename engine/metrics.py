@@ -19,8 +19,11 @@ from .iso2631 import Weighting, running_rms, vibration_dose, weighted
 
 Array = NDArray[np.float64]
 
-SQUAT_CUTOFF = 1.0
-"""Squat and dive are the pitch below this frequency, Hz: the road's share is mostly above."""
+SLOW = 1.0
+"""Whether the car accelerates or brakes is read from its a_x below this frequency, Hz."""
+
+LEAST_PUSH = 0.5
+"""Least acceleration or deceleration (m/s2) that is called one: above coasting down."""
 
 COMFORT = (
     (0.315, "not uncomfortable"),
@@ -122,14 +125,37 @@ def _body(run: Run) -> Iterator[Metric]:
         if name in run:
             value = rms(run.time, run[name])
             yield Metric(f"{name}.rms", f"{label}, rms", value, *units, "about its mean")
-    if "chassis.pitch" not in run:
+    if "chassis.pitch" in run:
+        yield from _pitch_peaks(run, degrees)
+        yield from _squat(run, degrees)
+
+
+def _pitch_peaks(run: Run, degrees: tuple[str, str, float]) -> Iterator[Metric]:
+    """Greatest pitch from rest either way."""
+    for name, label, sign in (("nose_up", "Nose up", -1.0), ("nose_down", "Nose down", 1.0)):
+        peak = max(float(np.max(sign * run["chassis.pitch"])), 0.0)
+        yield Metric(
+            f"chassis.pitch.{name}", f"{label}, peak", peak, *degrees, "greatest pitch from rest"
+        )
+
+
+def _squat(run: Run, degrees: tuple[str, str, float]) -> Iterator[Metric]:
+    """Mean pitch while the car accelerates or brakes, in which the road's share averages out."""
+    if "chassis.a_x" not in run:
         return
-    slow = smoothed(run.time, run["chassis.pitch"], SQUAT_CUTOFF)
-    for name, label, sign in (("squat", "Squat", -1.0), ("dive", "Dive", 1.0)):
-        peak = max(float(np.max(sign * slow)), 0.0)
+    slow = smoothed(run.time, run["chassis.a_x"], SLOW)
+    for name, label, sign, doing in (
+        ("squat", "Squat", 1.0, "accelerates"),
+        ("dive", "Dive", -1.0, "brakes"),
+    ):
+        push = sign * slow
+        if np.max(push) < LEAST_PUSH:
+            continue
+        during = push > 0.5 * np.max(push)
+        mean = float(np.mean(-sign * run["chassis.pitch"][during]))
         side = "up" if name == "squat" else "down"
-        meaning = f"greatest pitch nose {side} from rest, below {SQUAT_CUTOFF:g} Hz"
-        yield Metric(f"chassis.pitch.{name}", f"{label}, peak", peak, *degrees, meaning)
+        meaning = f"mean pitch nose {side} while the car {doing} at over half its most"
+        yield Metric(f"chassis.pitch.{name}", f"{label}, mean", mean, *degrees, meaning)
 
 
 def _travel(run: Run) -> Iterator[Metric]:
