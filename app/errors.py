@@ -1,0 +1,83 @@
+"""Errors of the service itself, each with its status; the sentence is for a person.
+
+Engine errors are what the caller can mend, hence 422; these state their own status.
+`problems.py` turns both into replies.
+"""
+
+from ..engine.errors import RideError
+
+
+class StartError(RideError):
+    """The service cannot start as it is set up."""
+
+    code = "start"
+
+
+class ServiceError(RideError):
+    """A request that the service itself refuses."""
+
+    status = 400
+
+    def __init__(self, message: str, *, retry_after: int | None = None):
+        super().__init__(message)
+        self.headers = {} if retry_after is None else {"Retry-After": str(retry_after)}
+
+
+class BadRequest(ServiceError):
+    """The request cannot be read."""
+
+    code = "bad-request"
+
+
+class Forbidden(ServiceError):
+    """The request comes from where none may come from, or without the token."""
+
+    code, status = "forbidden", 403
+
+
+class NotFound(ServiceError):
+    """Nothing by that name in this session."""
+
+    code, status = "not-found", 404
+
+
+class NotAcceptable(ServiceError):
+    """The reply cannot be had in the form asked for."""
+
+    code, status = "not-acceptable", 406
+
+
+class Conflict(ServiceError):
+    """What is asked for contradicts what is under way."""
+
+    code, status = "conflict", 409
+
+
+class TooLarge(ServiceError):
+    """A body, a file or a result over the limit."""
+
+    code, status = "too-large", 413
+
+
+class OverBudget(ServiceError):
+    """Work that would take more than a request may."""
+
+    code, status = "over-budget", 422
+
+
+class Busy(ServiceError):
+    """Too much under way for one session, or too much kept."""
+
+    code, status = "busy", 429
+
+
+class Unavailable(ServiceError):
+    """The service cannot do this just now."""
+
+    code, status = "unavailable", 503
+
+
+class Compiling(Unavailable):
+    """The kernels are not compiled yet."""
+
+    code = "compiling"
