@@ -1,0 +1,283 @@
+"""What the service keeps: sessions and their measurements; the originals stay on disk beside it.
+
+Every query names the session it serves, so that an id of somebody else's is simply not found.
+Methods block for a millisecond or so; the service calls them off the event loop.
+"""
+
+import hashlib
+import hmac
+import json
+import secrets
+import threading
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Row, delete, func, insert, select, update
+from sqlalchemy.dialects.sqlite import insert as insert_or
+
+from .data_directory import DataDirectory
+from .database import Database
+from .errors import Busy, Conflict, NotFound, Unavailable
+from .job_store import JobStore
+from .settings import Limits
+from .tables import measurements, sessions, uploads
+
+SEEN_EVERY = 60.0
+UNUSED_AFTER = 3600.0
+
+
+@dataclass(frozen=True)
+class Session:
+    """One visitor's workspace: the car being tuned and the car it is compared with, as JSON."""
+
+    id: str
+    vehicle: dict[str, Any]
+    baseline: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """One uploaded recording: `summary` is what was found in it."""
+
+    id: str
+    name: str
+    sha256: str
+    bytes: int
+    created: float
+    sample: bool
+    noise: dict[str, float]
+    summary: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class NewMeasurement:
+    """A recording to be kept, already parsed."""
+
+    name: str
+    data: bytes
+    summary: Mapping[str, Any]
+    noise: Mapping[str, float]
+    sample: bool = False
+
+
+class Store:
+    """Everything kept in one data directory; opening it locks the directory."""
+
+    def __init__(self, path: Path, limits: Limits):
+        self.limits = limits
+        self.directory = DataDirectory(path)
+        try:
+            self.database = Database(self.directory.database)
+        except BaseException:
+            self.directory.close()
+            raise
+        self.jobs = JobStore(self.database, limits)
+        self._seen: dict[str, float] = {}
+        self._originals = threading.Lock()
+        with self.database.reading() as connection:
+            kept = set(connection.execute(select(uploads.c.sha256)).scalars())
+        self.directory.sweep(kept)
+
+    def close(self) -> None:
+        """Close the database and give up the directory."""
+        self.database.close()
+        self.directory.close()
+
+    # Sessions
+
+    def create_session(
+        self, vehicle: Mapping[str, Any], samples: Iterable[NewMeasurement]
+    ) -> tuple[str, str]:
+        """Id and token of a fresh session that holds a vehicle and sample measurements."""
+        session, token, now = secrets.token_hex(8), secrets.token_urlsafe(32), time.time()
+        text = json.dumps(vehicle)
+        with self._originals, self.database.writing() as connection:
+            self._make_room(connection, now)
+            connection.execute(
+                insert(sessions).values(
+                    id=session,
+                    token_hash=_hash(token),
+                    created=now,
+                    seen=now,
+                    vehicle=text,
+                    baseline=text,
+                )
+            )
+            for order, sample in enumerate(samples):
+                self._insert(connection, session, sample, now + 1e-3 * order)
+        return session, token
+
+    def _make_room(self, connection: Any, now: float) -> None:
+        """Let go of workspaces that nobody ever used, if there are too many."""
+        count = select(func.count()).select_from(sessions)
+        if connection.execute(count).scalar_one() < self.limits.sessions:
+            return
+        unused = sessions.c.used.is_(False) & (sessions.c.seen < now - UNUSED_AFTER)
+        connection.execute(delete(sessions).where(unused))
+        if connection.execute(count).scalar_one() >= self.limits.sessions:
+            raise Unavailable(
+                f"The service already keeps {self.limits.sessions} sessions; delete one that is "
+                "no longer needed, or try again later.",
+                retry_after=600,
+            )
+
+    def holds(self, session: str, token: str) -> bool:
+        """Whether the token opens the session; notes that the session is in use."""
+        with self.database.reading() as connection:
+            kept = connection.execute(
+                select(sessions.c.token_hash).where(sessions.c.id == session)
+            ).scalar_one_or_none()
+        if kept is None or not hmac.compare_digest(kept, _hash(token)):
+            return False
+        now = time.time()
+        if now - self._seen.get(session, 0.0) > SEEN_EVERY:
+            self._seen[session] = now
+            self._set(session, seen=now)
+        return True
+
+    def session(self, session: str) -> Session:
+        """The workspace."""
+        with self.database.reading() as connection:
+            row = connection.execute(
+                select(sessions.c.vehicle, sessions.c.baseline).where(sessions.c.id == session)
+            ).one_or_none()
+        if row is None:
+            raise NotFound("The session has been deleted; open the start page for a new one.")
+        return Session(session, json.loads(row.vehicle), json.loads(row.baseline))
+
+    def set_vehicle(self, session: str, vehicle: Mapping[str, Any]) -> None:
+        """Replace the car being tuned."""
+        self._set(session, vehicle=json.dumps(vehicle), used=True)
+
+    def set_baseline(self, session: str, vehicle: Mapping[str, Any]) -> None:
+        """Replace the car it is compared with."""
+        self._set(session, baseline=json.dumps(vehicle), used=True)
+
+    def _set(self, session: str, **values: Any) -> None:
+        with self.database.writing() as connection:
+            connection.execute(update(sessions).where(sessions.c.id == session).values(**values))
+
+    def delete_session(self, session: str) -> None:
+        """Remove a workspace with all its measurements, jobs and results."""
+        with self._originals:
+            with self.database.writing() as connection:
+                connection.execute(delete(sessions).where(sessions.c.id == session))
+            self._drop_unreferenced()
+        self._seen.pop(session, None)
+
+    # Measurements
+
+    def add_measurement(self, session: str, new: NewMeasurement) -> Measurement:
+        """Keep an original and what was found in it; `Busy` where the session is full."""
+        with self._originals, self.database.writing() as connection:
+            mine = measurements.c.session == session
+            count, total = connection.execute(
+                select(func.count(), func.coalesce(func.sum(uploads.c.bytes), 0))
+                .select_from(measurements.join(uploads))
+                .where(mine)
+            ).one()
+            if count >= self.limits.session_measurements:
+                raise Busy(f"The session already holds {count} measurements; delete one first.")
+            if total + len(new.data) > self.limits.session_bytes:
+                raise Busy(
+                    f"The session's measurements would exceed {self.limits.session_bytes / 1e6:g} "
+                    "MB together; delete one first."
+                )
+            measurement = self._insert(connection, session, new, time.time())
+            connection.execute(update(sessions).where(sessions.c.id == session).values(used=True))
+        return self.measurement(session, measurement)
+
+    def _insert(self, connection: Any, session: str, new: NewMeasurement, now: float) -> str:
+        sha256, measurement = self.directory.keep(new.data), secrets.token_hex(8)
+        connection.execute(
+            insert_or(uploads)
+            .values(sha256=sha256, bytes=len(new.data), created=now)
+            .on_conflict_do_nothing()
+        )
+        connection.execute(
+            insert(measurements).values(
+                id=measurement,
+                session=session,
+                sha256=sha256,
+                name=new.name,
+                created=now,
+                sample=new.sample,
+                noise=json.dumps(dict(new.noise)),
+                summary=json.dumps(dict(new.summary)),
+            )
+        )
+        return measurement
+
+    def measurements(self, session: str) -> list[Measurement]:
+        """All measurements of a session, oldest first."""
+        with self.database.reading() as connection:
+            rows = connection.execute(_measurements(session).order_by(measurements.c.created)).all()
+        return [_measurement(row) for row in rows]
+
+    def measurement(self, session: str, measurement: str) -> Measurement:
+        """One measurement of a session."""
+        with self.database.reading() as connection:
+            row = connection.execute(
+                _measurements(session).where(measurements.c.id == measurement)
+            ).one_or_none()
+        if row is None:
+            raise NotFound("There is no measurement with that id in this session.")
+        return _measurement(row)
+
+    def original(self, measurement: Measurement) -> Path:
+        """Place of a measurement's original file."""
+        return self.directory.original(measurement.sha256)
+
+    def delete_measurement(self, session: str, measurement: str) -> None:
+        """Remove a measurement; `Conflict` while an unfinished job reads it."""
+        for job in self.jobs.unfinished(session):
+            if measurement in job.measurements:
+                raise Conflict(
+                    f"The identification {job.id} is still using this measurement; cancel it first."
+                )
+        self.measurement(session, measurement)
+        with self._originals:
+            with self.database.writing() as connection:
+                connection.execute(
+                    delete(measurements).where(
+                        measurements.c.session == session, measurements.c.id == measurement
+                    )
+                )
+            self._drop_unreferenced()
+
+    def _drop_unreferenced(self) -> None:
+        """Remove originals without a measurement: first the rows, then the files."""
+        with self.database.writing() as connection:
+            unreferenced = uploads.c.sha256.not_in(select(measurements.c.sha256))
+            gone = connection.execute(
+                delete(uploads).where(unreferenced).returning(uploads.c.sha256)
+            ).scalars()
+            dropped = list(gone)
+        for sha256 in dropped:
+            self.directory.drop(sha256)
+
+
+def _hash(token: str) -> str:
+    return hashlib.sha256(token.encode()).hexdigest()
+
+
+def _measurements(session: str) -> Any:
+    return (
+        select(measurements, uploads.c.bytes).join(uploads).where(measurements.c.session == session)
+    )
+
+
+def _measurement(row: Row[Any]) -> Measurement:
+    return Measurement(
+        id=row.id,
+        name=row.name,
+        sha256=row.sha256,
+        bytes=row.bytes,
+        created=row.created,
+        sample=row.sample,
+        noise=json.loads(row.noise),
+        summary=json.loads(row.summary),
+    )

@@ -1,0 +1,96 @@
+"""The tables of the service's database.
+
+Times are seconds since 1970. JSON is kept as text, written and read whole. An upload is one
+original file, kept once under its SHA-256 however many measurements are made of it.
+"""
+
+from sqlalchemy import (
+    Boolean,
+    Column,
+    Float,
+    ForeignKey,
+    Index,
+    Integer,
+    MetaData,
+    String,
+    Table,
+    Text,
+    UniqueConstraint,
+)
+
+SCHEMA_VERSION = 1
+
+metadata = MetaData()
+
+schema_version = Table("schema_version", metadata, Column("version", Integer, nullable=False))
+
+
+def _session() -> Column[str]:
+    return Column(
+        "session", String(32), ForeignKey("sessions.id", ondelete="CASCADE"), nullable=False
+    )
+
+
+sessions = Table(
+    "sessions",
+    metadata,
+    Column("id", String(32), primary_key=True),
+    Column("token_hash", String(64), nullable=False),
+    Column("created", Float, nullable=False),
+    Column("seen", Float, nullable=False),
+    Column("used", Boolean, nullable=False, default=False),
+    Column("vehicle", Text, nullable=False),
+    Column("baseline", Text, nullable=False),
+)
+
+uploads = Table(
+    "uploads",
+    metadata,
+    Column("sha256", String(64), primary_key=True),
+    Column("bytes", Integer, nullable=False),
+    Column("created", Float, nullable=False),
+)
+
+measurements = Table(
+    "measurements",
+    metadata,
+    Column("id", String(32), primary_key=True),
+    _session(),
+    Column("sha256", String(64), ForeignKey("uploads.sha256"), nullable=False),
+    Column("name", String(200), nullable=False),
+    Column("created", Float, nullable=False),
+    Column("sample", Boolean, nullable=False, default=False),
+    Column("noise", Text, nullable=False, default="{}"),
+    Column("summary", Text, nullable=False),
+)
+
+jobs = Table(
+    "jobs",
+    metadata,
+    Column("id", String(32), primary_key=True),
+    _session(),
+    Column("kind", String(32), nullable=False),
+    Column("key", String(100)),
+    Column("state", String(16), nullable=False),
+    Column("spec", Text, nullable=False),
+    Column("progress", Text, nullable=False, default="{}"),
+    Column("error", Text),
+    Column("created", Float, nullable=False),
+    Column("started", Float),
+    Column("finished", Float),
+    Column("attempts", Integer, nullable=False, default=0),
+    Column("restarts", Integer, nullable=False, default=0),
+    UniqueConstraint("session", "key"),
+)
+
+results = Table(
+    "results",
+    metadata,
+    Column("job", String(32), ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True),
+    Column("body", Text, nullable=False),
+)
+
+Index("measurements_of_session", measurements.c.session, measurements.c.created)
+Index("measurements_of_upload", measurements.c.sha256)
+Index("jobs_of_session", jobs.c.session, jobs.c.created)
+Index("jobs_by_state", jobs.c.state)

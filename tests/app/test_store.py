@@ -1,0 +1,242 @@
+"""What is kept, and that it is kept: locks, durability, references between rows and files."""
+
+import hashlib
+import os
+import sqlite3
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+from ridetune.app.data_directory import DataDirectory
+from ridetune.app.errors import Busy, Conflict, NotFound, StartError
+from ridetune.app.settings import Limits
+from ridetune.app.store import NewMeasurement, Store
+
+CAR = {"name": "a car"}
+
+
+@pytest.fixture
+def store(tmp_path):
+    store = Store(tmp_path / "data", Limits(unfinished_jobs=2, session_jobs=3))
+    yield store
+    store.close()
+
+
+@pytest.fixture
+def session(store) -> str:
+    return store.create_session(CAR, [])[0]
+
+
+def recording(data: bytes = b"0 1 2") -> NewMeasurement:
+    return NewMeasurement("run.csv", data, {"samples": 3}, {"chassis.z": 1e-3})
+
+
+def queued(store: Store, session: str, key: str | None = None, runs: tuple[str, ...] = ()) -> str:
+    spec = {"runs": [{"id": run, "name": "run"} for run in runs]}
+    return store.jobs.add(session, "test", spec, key)[0].id
+
+
+def test_a_data_directory_has_one_owner(tmp_path):
+    """The second one is told whose it is and what to do; afterwards it is free."""
+    first = DataDirectory(tmp_path)
+    with pytest.raises(StartError, match=rf"process {os.getpid()}.*--data"):
+        DataDirectory(tmp_path)
+    first.close()
+    DataDirectory(tmp_path).close()
+
+
+def test_the_lock_goes_with_its_process_however_it_ends(tmp_path):
+    """kill -9 leaves nothing locked."""
+    script = (
+        "import sys, time; from pathlib import Path;"
+        "from ridetune.app.data_directory import DataDirectory;"
+        "owner = DataDirectory(Path(sys.argv[1])); print('owned', flush=True); time.sleep(60)"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", script, str(tmp_path)], stdout=subprocess.PIPE
+    ) as other:
+        assert other.stdout is not None
+        assert other.stdout.readline() == b"owned\n"
+        with pytest.raises(StartError, match=f"process {other.pid}"):
+            DataDirectory(tmp_path)
+        other.kill()
+    DataDirectory(tmp_path).close()
+
+
+def test_a_directory_that_cannot_be_made_is_named(tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(StartError, match="--data"):
+        DataDirectory(tmp_path / "file" / "below")
+
+
+def test_the_database_flushes_every_commit_and_checks_references(store):
+    """WAL, synchronous=FULL (2), foreign keys on: read back from the connection itself."""
+    with store.database.reading() as connection:
+        answers = {
+            name: connection.exec_driver_sql(f"PRAGMA {name}").scalar()
+            for name in ("journal_mode", "synchronous", "foreign_keys", "busy_timeout")
+        }
+    assert answers == {
+        "journal_mode": "wal",
+        "synchronous": 2,
+        "foreign_keys": 1,
+        "busy_timeout": 10_000,
+    }
+
+
+def test_a_database_of_another_version_is_refused(tmp_path):
+    Store(tmp_path, Limits()).close()
+    with sqlite3.connect(tmp_path / "ridetune.sqlite") as connection:
+        connection.execute("UPDATE schema_version SET version = 99")
+    connection.close()
+    with pytest.raises(StartError, match="version 99"):
+        Store(tmp_path, Limits())
+    DataDirectory(tmp_path).close()
+
+
+def test_everything_is_there_after_reopening(tmp_path):
+    store = Store(tmp_path, Limits())
+    session, token = store.create_session(CAR, [recording(b"sample")])
+    kept = store.add_measurement(session, recording())
+    job = queued(store, session)
+    store.jobs.finish(job, "done", result={"cost": 1.5})
+    store.close()
+
+    store = Store(tmp_path, Limits())
+    assert store.holds(session, token)
+    assert store.session(session).vehicle == CAR
+    assert [one.name for one in store.measurements(session)] == ["run.csv", "run.csv"]
+    assert store.original(store.measurement(session, kept.id)).read_bytes() == b"0 1 2"
+    assert store.measurement(session, kept.id).noise == {"chassis.z": 1e-3}
+    assert store.jobs.get(session, job).result == {"cost": 1.5}
+    store.close()
+
+
+def test_leftovers_of_a_crash_are_swept_and_originals_stay(tmp_path):
+    """A half-written file and one whose row was never committed."""
+    store = Store(tmp_path, Limits())
+    session, _ = store.create_session(CAR, [])
+    kept = store.original(store.add_measurement(session, recording()))
+    store.close()
+    orphan = kept.with_name("0" * 64)
+    half = kept.with_suffix(".tmp")
+    for leftover in (orphan, half):
+        leftover.write_bytes(b"?")
+    Store(tmp_path, Limits()).close()
+    assert kept.read_bytes() == b"0 1 2"
+    assert not orphan.exists()
+    assert not half.exists()
+
+
+def test_an_original_is_named_by_its_hash(store, session):
+    kept = store.add_measurement(session, recording(b"abc"))
+    assert kept.sha256 == hashlib.sha256(b"abc").hexdigest()
+    assert store.original(kept).name == kept.sha256
+
+
+def test_uploads_and_deletions_of_the_same_bytes_at_once_never_lose_a_file(store, session):
+    """Every measurement that is listed has its original, whatever else goes on."""
+    errors = []
+
+    def come_and_go() -> None:
+        try:
+            for _ in range(15):
+                kept = store.add_measurement(session, recording())
+                assert store.original(kept).read_bytes() == b"0 1 2"
+                store.delete_measurement(session, kept.id)
+        except Exception as error:
+            errors.append(error)
+
+    threads = [threading.Thread(target=come_and_go) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert errors == []
+    assert store.measurements(session) == []
+
+
+def test_a_token_opens_its_own_session_only(store):
+    (first, first_token), (second, second_token) = (store.create_session(CAR, []) for _ in "ab")
+    assert store.holds(first, first_token)
+    assert not store.holds(first, second_token)
+    assert not store.holds(second, "")
+    assert not store.holds("nobody", first_token)
+
+
+def test_room_is_made_from_sessions_nobody_used(tmp_path, monkeypatch):
+    """A session with something of its own stays; one that only looked goes after an hour."""
+    store = Store(tmp_path, Limits(sessions=2))
+    used, used_token = store.create_session(CAR, [])
+    store.set_vehicle(used, {"name": "mine"})
+    looked, looked_token = store.create_session(CAR, [])
+    now = time.time()
+    monkeypatch.setattr("ridetune.app.store.time.time", lambda: now + 7200.0)
+    store.create_session(CAR, [])
+    assert store.holds(used, used_token)
+    assert not store.holds(looked, looked_token)
+    store.close()
+
+
+def test_a_measurement_in_use_is_not_deleted(store, session):
+    kept = store.add_measurement(session, recording())
+    job = queued(store, session, runs=(kept.id,))
+    with pytest.raises(Conflict, match=job):
+        store.delete_measurement(session, kept.id)
+    store.jobs.finish(job, "cancelled")
+    store.delete_measurement(session, kept.id)
+    with pytest.raises(NotFound):
+        store.measurement(session, kept.id)
+
+
+def test_the_same_key_is_the_same_job(store, session):
+    first, new = store.jobs.add(session, "test", {"runs": []}, "mine")
+    again, newer = store.jobs.add(session, "test", {"runs": []}, "mine")
+    assert (new, newer) == (True, False)
+    assert again.id == first.id
+    other, _ = store.create_session(CAR, [])
+    assert queued(store, other, key="mine") != first.id
+
+
+def test_a_session_has_its_share_of_jobs(store, session):
+    """Two under way, three kept in all."""
+    first, _ = queued(store, session), queued(store, session)
+    with pytest.raises(Busy, match="2 identifications under way"):
+        queued(store, session)
+    store.jobs.finish(first, "done")
+    store.jobs.finish(queued(store, session), "failed", error={"code": "x", "detail": "y"})
+    with pytest.raises(Busy, match="delete some"):
+        queued(store, session)
+    assert [job.state for job in store.jobs.of_session(session)] == ["done", "queued", "failed"]
+
+
+def test_a_final_state_stays(store, session):
+    """Whatever news comes late: the first end is the end."""
+    job = queued(store, session)
+    assert store.jobs.finish(job, "cancelled")
+    assert not store.jobs.finish(job, "done", result={"late": True})
+    assert not store.jobs.start(job)
+    assert not store.jobs.requeue(job)
+    kept = store.jobs.get(session, job)
+    assert (kept.state, kept.result) == ("cancelled", None)
+
+
+def test_a_restart_takes_running_jobs_back_and_counts_it_apart(store, session):
+    job = queued(store, session)
+    store.jobs.start(job)
+    store.jobs.requeue_all()
+    kept = store.jobs.get(session, job)
+    assert (kept.state, kept.restarts, kept.attempts, kept.started) == ("queued", 1, 0, None)
+    assert store.jobs.requeue(job)
+    assert store.jobs.get(session, job).attempts == 1
+
+
+def test_jobs_of_another_session_are_not_found(store, session):
+    job = queued(store, session)
+    other, _ = store.create_session(CAR, [])
+    with pytest.raises(NotFound):
+        store.jobs.get(other, job)
+    store.jobs.delete(other, job)
+    assert store.jobs.get(session, job).id == job
