@@ -18,9 +18,9 @@ independent,
 
     mean_k = sqrt((1 + g)/2) U_k,   half_k = sqrt((1 - g)/2) V_k,   left, right = mean +- half
 
-so both tracks have the same spectrum and E[left conj(right)] = g E|left|^2. A seed fixes U and V;
-because the realisation starts at X = 0 and the period grows only by doubling, a longer road or
-another car continues the same road.
+so both tracks have the same spectrum and E[left conj(right)] = g E|left|^2. A seed fixes U and V,
+and the realisation starts at X = 0 whatever the car, so roads of one seed are the same road, longer
+or shorter, as long as one period holds them.
 
 Sources: ISO 8608; Dodds and Robson (1973), Kamash and Robson (1978) for isotropic coherence.
 """
@@ -28,7 +28,7 @@ Sources: ISO 8608; Dodds and Robson (1973), Kamash and Robson (1978) for isotrop
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +39,6 @@ from .errors import RoadError
 from .road import Road
 
 Coherence = Literal["exponential", "isotropic", "none", "full"]
-COHERENCE_LAWS: tuple[Coherence, ...] = get_args(Coherence)
 
 REFERENCE_FREQUENCY = 0.1
 """n0, cycle/m."""
@@ -48,8 +47,8 @@ CLASSES = dict(zip("ABCDEFGH", (16e-6 * 4.0**k for k in range(8)), strict=True))
 """Gd(n0) of each class by geometric mean, m3."""
 
 SPACING = 0.05
-"""Grid of a random road, m: seven points to the shortest wave of the band, where the cubic spline's
-response is within 0.1 %."""
+"""Grid of a random road, m: seven points to the shortest wave of the band, in which the spline is
+within 0.2 % of the amplitude."""
 
 BLEND_LENGTH = 2.0
 """A section's roughness grows in over this distance, m."""
@@ -168,9 +167,9 @@ def _power_integral(lower, upper, waviness: float):
 
 
 def _period(length: float) -> float:
-    """Least doubling of SHORTEST_PERIOD that holds the road."""
+    """Least doubling of SHORTEST_PERIOD that holds the road, m."""
     period = SHORTEST_PERIOD
-    while period < length + 100.0:
+    while period < length:
         period *= 2.0
     return period
 

@@ -23,7 +23,7 @@ Frequency = Annotated[float, Range("Hz", 0.01, 100.0)]
 Amplitude = Annotated[float, Range("m", 1e-6, 0.5)]
 
 POINTS_PER_WAVE = 40
-"""Samples to the shortest wave: a cubic spline through them is within 1e-6 of the amplitude."""
+"""Samples to the shortest wave: a cubic spline through them is within 1e-5 of the amplitude."""
 
 LONGEST_STEP = 0.005
 """s."""
