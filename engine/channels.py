@@ -77,7 +77,7 @@ CHANNEL_KINDS: tuple[ChannelInfo, ...] = (
         "acceleration",
         "Chassis longitudinal acceleration",
         "forward, inertial",
-        largest=30.0,
+        largest=20.0,
     ),
     _row("chassis.v_x", "m/s", "speed", "Speed", "forward", ("km/h", 3.6), largest=120.0),
     _row("chassis.x", "m", "distance", "Distance travelled", "forward"),
@@ -193,7 +193,7 @@ CHANNEL_KINDS: tuple[ChannelInfo, ...] = (
 )
 """The rows as documented; forces at mounts and pivots act on the chassis."""
 
-_POINT = re.compile(r"(seat|point)\.([a-z][a-z0-9_]*)\.a_([xyz])")
+_POINT = re.compile(r"(seat|point)\.([a-z][a-z0-9_]{0,39})\.a_([xyz])")
 _POINT_SIGN = {"x": "forward", "y": "left", "z": "up"}
 _CORNER_WORDS = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 
