@@ -11,7 +11,10 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import closing
+from functools import partial
+from itertools import chain, islice
 from typing import BinaryIO
 
 import numpy as np
@@ -28,13 +31,17 @@ MOST_COLUMNS = 1000
 MOST_NUMBERS = 25_000_000
 """Most numbers read from one file: samples times columns in use; 200 MB of memory."""
 
-LONGEST_HEADER = 200_000
-"""Longest header line, characters."""
+LONGEST_LINE = 100_000
+"""Longest line, characters."""
+
+LONGEST_TITLE = 200
+"""Longest title of a column that is taken apart, characters."""
 
 _HEAD = 65_536
 _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x19\x1b-\x1f]")
 _NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
-_SEPARATOR_LINE = re.compile(r'"?sep=(.)"?\s*', re.IGNORECASE)
+_TITLE = re.compile(r"\s*(?P<name>[^\[\]()]*?)\s*(?:[\[(]\s*(?P<unit>[^\[\]]*?)\s*[\])])?\s*")
+_SEPARATOR_LINE = re.compile(r'"?sep=([,;\t|])"?\s*', re.IGNORECASE)
 _MARKS = (
     (b"\xff\xfe\x00\x00", "utf-32"),
     (b"\x00\x00\xfe\xff", "utf-32"),
@@ -59,33 +66,48 @@ class CsvTable:
 
     def numbers(self, columns: Sequence[int]) -> NDArray[np.float64]:
         """The numbers of some columns, (samples, len(columns)), all finite."""
-        columns = list(columns)
-        rows = self._rows(columns)
-        first = next(rows, None)
-        if first is None:
-            raise self._refuse("there are no samples below the header; export the data with it")
-        try:
-            table = np.loadtxt(
-                self._limited(first, rows, len(columns)),
-                delimiter=self._delimiter,
-                comments=None,
-                usecols=columns,
-                ndmin=2,
-            )
-        except ValueError as error:
-            raise self._bad_cell(columns) from error
-        if not np.isfinite(table).all():
-            raise self._bad_cell(columns)
+        columns, last = list(columns), (0, "")
+        most = MOST_NUMBERS // max(len(columns), 1)
+
+        def texts(rows: Iterator[tuple[int, str]]) -> Iterator[str]:
+            nonlocal last
+            for count, last in enumerate(rows, start=1):
+                if count > most:
+                    raise self._refuse(
+                        f": more than {most} samples of {len(columns)} columns; cut the recording"
+                        " or thin it out",
+                        last[0],
+                    )
+                yield last[1]
+
+        with closing(self._rows(columns)) as rows:
+            first = next(rows, None)
+            if first is None:
+                raise self._refuse("no samples stand below the header; export them with it")
+            try:
+                table = np.loadtxt(
+                    texts(chain([first], rows)),
+                    delimiter=self._delimiter,
+                    comments=None,
+                    usecols=columns,
+                    ndmin=2,
+                )
+            except ValueError as error:
+                raise self._bad_cell(columns, *last) from error
+        finite = np.isfinite(table).all(axis=1)
+        if not finite.all():
+            raise self._bad_cell(columns, *self._row(int(np.argmin(finite)), columns))
         return table
 
     def line_of(self, row: int) -> int:
-        """The line of the file that holds a row of `numbers`, both as it counts them (row from 0)."""
-        for index, (line, _) in enumerate(self._rows([])):
-            if index == row:
-                return line
-        raise IndexError(row)
+        """The line of the file, counted from 1, that holds a row of `numbers`, counted from 0."""
+        return self._row(row, [])[0]
+
+    def _row(self, row: int, columns: Sequence[int]) -> tuple[int, str]:
+        return next(islice(self._rows(columns), row, None))
 
     def _refuse(self, sentence: str, line: int | None = None) -> MeasurementError:
+        """The error whose sentence follows the file's name, or the number of the line in it."""
         place = f"{self._source}: " if line is None else f"{self._source}: line {line}"
         return MeasurementError(f"{place}{sentence}.")
 
@@ -117,61 +139,40 @@ class CsvTable:
         """Every line of the file with its number, counted from 1."""
         text = self._text()
         try:
-            yield from enumerate(text, start=1)
+            for number, line in enumerate(iter(partial(text.readline, LONGEST_LINE + 1), ""), 1):
+                if len(line) > LONGEST_LINE:
+                    raise self._refuse(
+                        f" is longer than {LONGEST_LINE} characters; export fewer columns, one row"
+                        " a sample",
+                        number,
+                    )
+                yield number, line
         finally:
             text.detach()
 
     def _read_header(self) -> tuple[str, int, list[str]]:
         """The delimiter, the header's line number and its cells."""
-        text, number, delimiter = self._text(), 0, None
-        try:
-            while line := text.readline(LONGEST_HEADER + 1):
-                number += 1
-                if len(line) > LONGEST_HEADER:
+        delimiter = None
+        for number, line in self._lines():
+            if separator := _SEPARATOR_LINE.fullmatch(line):
+                delimiter = separator[1]
+            elif line.strip():
+                line = _mended(line.rstrip("\n"))
+                if delimiter is None:
+                    bare = re.sub(r'"[^"]*"', "", line)
+                    delimiter = max(",;\t", key=bare.count)
+                cells = [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
+                while cells and not cells[-1]:
+                    cells.pop()
+                if len(cells) > MOST_COLUMNS:
                     raise self._refuse(
-                        f": the line is longer than {LONGEST_HEADER} characters; export fewer"
-                        " columns, one row a sample",
+                        f" names {len(cells)} columns, more than {MOST_COLUMNS}; export fewer",
                         number,
                     )
-                if separator := _SEPARATOR_LINE.fullmatch(line):
-                    delimiter = separator[1]
-                elif line.strip():
-                    break
-        finally:
-            text.detach()
-        line = _mended(line)
-        if not line.strip():
-            raise self._refuse("the file holds blank lines only; export the recording again")
-        if delimiter is None:
-            bare = re.sub(r'"[^"]*"', "", line)
-            delimiter = max(",;\t", key=bare.count)
-        cells = [
-            cell.strip() for cell in next(csv.reader([line.rstrip("\n")], delimiter=delimiter))
-        ]
-        while cells and not cells[-1]:
-            cells.pop()
-        if len(cells) > MOST_COLUMNS:
-            raise self._refuse(
-                f" names {len(cells)} columns, more than {MOST_COLUMNS}; export fewer", number
-            )
-        return delimiter, number, cells
+                return delimiter, number, cells
+        raise self._refuse("the file is blank; export the recording again")
 
-    def _limited(
-        self, first: tuple[int, str], rows: Iterator[tuple[int, str]], width: int
-    ) -> Iterator[str]:
-        """The text of the rows, ended with an error where they would take too much memory."""
-        yield first[1]
-        most = MOST_NUMBERS // max(width, 1)
-        for count, (line, text) in enumerate(rows, start=2):
-            if count > most:
-                raise self._refuse(
-                    f": more than {most} samples of {width} columns; cut the recording or thin it"
-                    " out",
-                    line,
-                )
-            yield text
-
-    def _rows(self, used: Sequence[int]) -> Iterator[tuple[int, str]]:
+    def _rows(self, used: Sequence[int]) -> Generator[tuple[int, str], None, None]:
         """Line number and text of every row with data, quotes and decimal commas resolved."""
         delimiter, blank, width = self._delimiter, self._blank, len(self.header)
         commas = delimiter != ","
@@ -188,7 +189,12 @@ class CsvTable:
 
     def _unquoted(self, number: int, line: str, used: Sequence[int]) -> str:
         """A line with its quotes taken off; a comma between quotes would be an ambiguous number."""
-        cells = next(csv.reader([line.rstrip("\n")], delimiter=self._delimiter), [])
+        try:
+            cells = next(csv.reader([line.rstrip("\n")], delimiter=self._delimiter, strict=True))
+        except csv.Error as error:
+            raise self._refuse(
+                " has a quote that is not closed; close it or remove it", number
+            ) from error
         for index, cell in enumerate(cells):
             if self._delimiter in cell:
                 if index in used:
@@ -227,33 +233,27 @@ class CsvTable:
             number,
         )
 
-    def _bad_cell(self, columns: Sequence[int]) -> MeasurementError:
-        """The sentence about the first cell that holds no finite number."""
-        for number, line in self._rows(columns):
-            cells = line.split(self._delimiter)
-            for index in columns:
-                cell = cells[index].strip()
-                if not cell:
-                    return self._refuse(
-                        f", column {self._title(index)}: the cell is empty; fill it or remove the"
-                        " line (samples need not be evenly spaced)",
-                        number,
-                    )
-                if cell.lower().lstrip("+-") in ("nan", "inf", "infinity"):
-                    return self._bad_number(
-                        number,
-                        index,
-                        cell,
-                        "repair it or remove the line (samples need not be evenly spaced)",
-                        "not finite",
-                    )
-                if not _NUMBER.fullmatch(cell):
-                    return self._bad_number(number, index, cell, "write a plain decimal number")
-                if math.isinf(float(cell)):
-                    return self._bad_number(
-                        number, index, cell, "correct it or remove the line", "too large"
-                    )
-        return self._refuse("the numbers cannot be read; export the recording again")
+    def _bad_cell(self, columns: Sequence[int], line: int, text: str) -> MeasurementError:
+        """The sentence about the first cell of a line that holds no finite number."""
+        cells = text.split(self._delimiter)
+        uneven = "(samples need not be evenly spaced)"
+        for index in columns:
+            cell = cells[index].strip()
+            if not cell:
+                return self._refuse(
+                    f", column {self._title(index)}: the cell is empty; fill it or remove the line"
+                    f" {uneven}",
+                    line,
+                )
+            if cell.lower().lstrip("+-") in ("nan", "inf", "infinity"):
+                remedy = f"repair it or remove the line {uneven}"
+                return self._bad_number(line, index, cell, remedy, "not finite")
+            if not _NUMBER.fullmatch(cell):
+                return self._bad_number(line, index, cell, "write a plain decimal number")
+            if math.isinf(float(cell)):
+                remedy = "correct it or remove the line"
+                return self._bad_number(line, index, cell, remedy, "too large")
+        return self._refuse(" cannot be read; correct it or remove it", line)
 
     def _bad_number(
         self, line: int, index: int, cell: str, remedy: str, what: str = "not a number"
@@ -273,6 +273,12 @@ def _mended(line: str) -> str:
     except UnicodeEncodeError:
         return line.encode("utf-8", "surrogateescape").decode("cp1252", "replace")
     return line
+
+
+def split_title(title: str) -> tuple[str, str]:
+    """Name and unit of a column's title `name [unit]` or `name (unit)`; "" where none is given."""
+    match = _TITLE.fullmatch(title) if len(title) <= LONGEST_TITLE else None
+    return (match["name"], match["unit"] or "") if match else (title, "")
 
 
 def is_number(text: str) -> bool:

@@ -1,0 +1,235 @@
+"""Text files as they come from test benches and spreadsheets.
+
+Oracle: the numbers that were written; where a file is refused, the place in it that was spoilt.
+"""
+
+import io
+import re
+
+import numpy as np
+import pytest
+from ridetune.engine import csv_table
+from ridetune.engine.csv_table import CsvTable, is_number, split_title
+from ridetune.engine.errors import MeasurementError
+
+NUMBERS = np.array([[0.0, -1.5, 3e-7], [0.01, 2.25, 4e5], [0.02, 0.0, -12.0]])
+PLAIN = "time [s],chassis.z [mm],temp\n" + "".join(
+    ",".join(map(repr, row)) + "\n" for row in NUMBERS.tolist()
+)
+
+
+def table_of(content):
+    data = content.encode() if isinstance(content, str) else content
+    return CsvTable(io.BytesIO(data), "run.csv")
+
+
+def read(content):
+    table = table_of(content)
+    return table.numbers(range(len(table.header)))
+
+
+def refusal(content):
+    with pytest.raises(MeasurementError) as caught:
+        read(content)
+    return str(caught.value)
+
+
+def test_a_plain_file_is_read_to_the_last_digit():
+    table = table_of(PLAIN)
+    assert table.header == ["time [s]", "chassis.z [mm]", "temp"]
+    np.testing.assert_array_equal(table.numbers([0, 1, 2]), NUMBERS)
+
+
+def test_columns_can_be_chosen_and_ordered():
+    np.testing.assert_array_equal(table_of(PLAIN).numbers([2, 0]), NUMBERS[:, [2, 0]])
+
+
+SEMICOLONS = PLAIN.replace(",", ";")
+VARIANTS = {
+    "byte order mark": PLAIN.encode("utf-8-sig"),
+    "utf-16 little endian": PLAIN.encode("utf-16"),
+    "utf-16 big endian": b"\xfe\xff" + PLAIN.encode("utf-16-be"),
+    "utf-16 without mark": PLAIN.encode("utf-16-le"),
+    "utf-16 big endian without mark": PLAIN.encode("utf-16-be"),
+    "utf-32": PLAIN.encode("utf-32"),
+    "windows line ends": PLAIN.replace("\n", "\r\n"),
+    "old macintosh line ends": PLAIN.replace("\n", "\r"),
+    "no last line end": PLAIN.rstrip("\n"),
+    "blank lines": "\n\n" + PLAIN.replace("\n", "\n\n  \n"),
+    "tabs": PLAIN.replace(",", "\t"),
+    "semicolons": SEMICOLONS,
+    "semicolons and decimal commas": SEMICOLONS.replace(".", ","),
+    "tabs and decimal commas": PLAIN.replace(",", "\t").replace(".", ","),
+    "excel's separator line": "sep=;\n" + SEMICOLONS,
+    "excel's empty rows": PLAIN + ",,\n,,\n",
+    "delimiters at line ends": PLAIN.replace("\n", ",\n"),
+    "delimiters at the ends of rows only": PLAIN.replace("\n", ",\n").replace("temp,", "temp"),
+    "spaces": PLAIN.replace(",", " , "),
+    "quotes": "".join(
+        ",".join(f'"{cell}"' for cell in line.split(",")) + "\n" for line in PLAIN.splitlines()
+    ),
+    "quotes and decimal commas": "".join(
+        ";".join(f'"{cell}"' for cell in line.split(";")) + "\n"
+        for line in SEMICOLONS.replace(".", ",").splitlines()
+    ),
+    "plus signs": PLAIN.replace(",2.25", ",+2.25"),
+    "end-of-file sign of DOS": PLAIN + "\x1a",
+}
+
+
+@pytest.mark.parametrize("content", VARIANTS.values(), ids=VARIANTS.keys())
+def test_the_usual_variants_hold_the_same_numbers(content):
+    np.testing.assert_array_equal(read(content), NUMBERS)
+
+
+def test_a_degree_sign_written_by_windows_is_understood():
+    assert table_of("time [s],pitch [°]\n0,1\n".encode("cp1252")).header[1] == "pitch [°]"
+
+
+def test_text_in_a_column_that_is_not_used_does_no_harm():
+    content = PLAIN.replace("-12.0", '"wet, ""cold"""')
+    np.testing.assert_array_equal(table_of(content).numbers([0, 1]), NUMBERS[:, :2])
+
+
+def test_a_german_date_in_a_column_that_is_not_used_does_no_harm():
+    content = "t;date;z\n0,5;12.05.2024;1,5\n"
+    np.testing.assert_array_equal(table_of(content).numbers([0, 2]), [[0.5, 1.5]])
+
+
+def test_a_row_knows_its_line():
+    table = table_of("\n" + PLAIN.replace("\n", "\r\n\r\n"))
+    assert [table.line_of(row) for row in range(3)] == [4, 6, 8]
+
+
+@pytest.mark.parametrize(
+    ("cell", "what"),
+    [
+        ("abc", "'abc' is not a number"),
+        ("0x10", "'0x10' is not a number"),
+        ("1_000", "'1_000' is not a number"),
+        ("1.2.3", "'1.2.3' is not a number"),
+        ("12:30:01", "'12:30:01' is not a number"),
+        ("1 000", "'1 000' is not a number"),
+        ("٣", "is not a number"),
+        ("x" * 100, "xxx...' is not a number"),
+        ("nan", "'nan' is not finite; repair it or remove the line"),
+        ("-Inf", "'-Inf' is not finite"),
+        ("1e999", "'1e999' is too large"),
+        ("", "the cell is empty; fill it or remove the line"),
+        ('"1,5"', "'1,5' is not a number; write numbers with a decimal point"),
+    ],
+)
+def test_a_cell_that_is_no_number_is_named(cell, what):
+    message = refusal(PLAIN.replace("2.25", cell))
+    assert message.startswith("run.csv: line 3, column chassis.z [mm]: ")
+    assert what in message
+
+
+def test_a_bad_cell_after_many_lines_is_named_by_its_line():
+    """numpy reads in chunks of 50 000 lines; the place must not depend on that."""
+    good = "".join(f"{i},1,2\n" for i in range(120_001))
+    for cell in ("bad", "nan"):
+        content = "time,a,b\n\n" + good + f"1e6,{cell},1\n" + good
+        assert refusal(content).startswith("run.csv: line 120004, column a: ")
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("", "run.csv: the file is empty"),
+        (" \n\n", "run.csv: the file is empty"),
+        ("sep=;\n", "run.csv: the file is blank"),
+        ("time,a\n", "run.csv: no samples stand below the header"),
+        ("time,a\n\n,\n", "run.csv: no samples stand below the header"),
+        ("time,a\n1,2\n3\n", "run.csv: line 3 holds 1 cells where the header names 2 columns"),
+        ("time,a\n1,2\n3,4,5\n", "run.csv: line 3 holds 3 cells where the header names 2"),
+        ("t,a\n0,5,1,5\n", "with decimal commas, separate the columns by semicolons"),
+        ("t;a\n0,5;1.234,5\n", "line 2, column a: '1.234,5' is not a number; the line mixes"),
+        ('t,a\n1,"2\n', "line 2 has a quote that is not closed; close it or remove it"),
+    ],
+)
+def test_a_spoilt_table_is_refused_with_place_and_remedy(content, message):
+    assert message in refusal(content)
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (bytes(range(256)) * 50, "this is a binary file, not text; export the recording as CSV"),
+        (b"time,a\n1,2\n\x00\x01\x02", "binary"),
+        (b"PK\x03\x04\x14\x00" + bytes(100), "workbook or a zip archive"),
+        (b"MDF     4.10\x00\x00", "binary"),
+    ],
+)
+def test_a_binary_file_is_not_taken_for_text(data, message):
+    assert message in refusal(data)
+
+
+def test_an_endless_line_is_refused_before_it_fills_the_memory():
+    endless = "time,a\n" + "1," * csv_table.LONGEST_LINE
+    assert "run.csv: line 2 is longer than 100000 characters" in refusal(endless)
+    assert "run.csv: line 1 is longer than 100000 characters" in refusal(endless[7:])
+
+
+def test_a_thousand_columns_are_enough():
+    width = csv_table.MOST_COLUMNS
+    row = ",".join(["1"] * width) + "\n"
+    header = ",".join(f"c{i}" for i in range(width))
+    assert read(header + "\n" + row).shape == (1, width)
+    assert f"names {width + 1} columns, more than {width}" in refusal(header + ",x\n" + row)
+
+
+def test_numbers_that_would_fill_the_memory_are_refused(monkeypatch):
+    monkeypatch.setattr(csv_table, "MOST_NUMBERS", 6)
+    assert read("a,b\n1,2\n3,4\n5,6\n").shape == (3, 2)
+    assert "line 5: more than 3 samples of 2 columns" in refusal("a,b\n1,2\n3,4\n5,6\n7,8\n")
+
+
+def test_damaged_bytes_never_end_in_anything_but_a_sentence():
+    """A thousand seeded damages of good files: read, or refused with the file's name."""
+    rng = np.random.default_rng(20240517)
+    good = [value.encode() if isinstance(value, str) else value for value in VARIANTS.values()]
+    for _ in range(1000):
+        data = bytearray(good[rng.integers(len(good))])
+        for _ in range(rng.integers(1, 6)):
+            place = int(rng.integers(len(data)))
+            match rng.integers(3):
+                case 0:
+                    data[place] = int(rng.integers(256))
+                case 1:
+                    del data[place : place + int(rng.integers(1, 20))]
+                case _:
+                    data[place:place] = bytes(data[: int(rng.integers(1, 40))])
+            data = data or bytearray(b"\n")
+        message = ""
+        try:
+            assert np.isfinite(read(bytes(data))).all()
+        except MeasurementError as error:
+            message = str(error)
+        assert re.fullmatch(r"(run\.csv: .+\.)?", message)
+
+
+@pytest.mark.parametrize(
+    ("title", "parts"),
+    [
+        ("chassis.z [mm]", ("chassis.z", "mm")),
+        ("chassis.z[mm]", ("chassis.z", "mm")),
+        ("chassis.a_x ( m/s^2 )", ("chassis.a_x", "m/s^2")),
+        ("time", ("time", "")),
+        ("time []", ("time", "")),
+        ("a [b] [c]", ("a [b] [c]", "")),
+        ("x" * 201, ("x" * 201, "")),
+    ],
+)
+def test_a_title_is_a_name_and_a_unit(title, parts):
+    assert split_title(title) == parts
+
+
+@pytest.mark.parametrize("text", ["1", "-1.5", "+.5e-3", "1,5", " 2. "])
+def test_plain_decimal_numbers_are_numbers(text):
+    assert is_number(text)
+
+
+@pytest.mark.parametrize("text", ["", "nan", "0x1", "1e", "time", "1.2.3", "."])
+def test_other_texts_are_no_numbers(text):
+    assert not is_number(text)
