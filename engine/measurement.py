@@ -1,30 +1,26 @@
 """Measurement files: a CSV with `name [unit]` columns becomes a Run in SI, and back.
 
-Names are those of the table of channels, in any case; a column of another name is left out with a
-warning, unless it looks like a misspelling of a channel the file lacks. A file NAME.toml beside
-NAME.csv may state what is known about the recording:
-
-    description = "Manoeuvre 2, wet road"
-    [noise]                      # standard deviation of the measurement noise, SI
-    "chassis.z" = 0.0005
+Names are those of the table of channels, in any case. A column of another name is left out with a
+warning, unless it looks like a misspelling of a channel the file lacks. NAME.toml beside NAME.csv
+may state noise and description (see `run_notes`).
 """
 
 import io
 import re
-import tomllib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from difflib import SequenceMatcher, get_close_matches
+from difflib import SequenceMatcher
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .channels import CHANNELS, ChannelInfo, Run, channel, find_channel
-from .csv_table import LARGEST_FILE, CsvTable, is_number
-from .errors import MeasurementError, RideError
+from .csv_table import LARGEST_FILE, CsvTable, is_number, split_title
+from .errors import MeasurementError
 from .frames import CORNERS
+from .run_notes import RunNotes, checked_noise, read_notes
 from .units import UnitError, to_si
 
 FEWEST_SAMPLES = 10
@@ -34,10 +30,10 @@ COARSEST_STEP = 0.2
 """Time between samples, s, from which on the unit of time is doubtful."""
 
 INPUTS_FOR_IDENTIFICATION = (*(f"wheel.{corner}.z" for corner in CORNERS), "chassis.a_x")
-OUTPUTS_FOR_IDENTIFICATION = ("chassis.z", "chassis.pitch", "chassis.roll")
+"""Channels that drive the model in an identification."""
 
-_TITLE = re.compile(r"(?P<name>[^\[\]()]*?)\s*(?:[\[(]\s*(?P<unit>.*?)\s*[\])])?")
-_LARGEST_NOTES = 1_000_000
+OUTPUTS_FOR_IDENTIFICATION = ("chassis.z", "chassis.pitch", "chassis.roll")
+"""Channels the model is compared with; a run needs at least one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +42,6 @@ class _Column:
 
     index: int
     info: ChannelInfo
-    title: str
     unit: str
     factor: float
     offset: float
@@ -58,15 +53,11 @@ def read_run(path: str | Path, *, noise: Mapping[str, float] | None = None) -> R
     noise : standard deviations in SI by channel; they go before those of the notes
     """
     path = Path(path)
-    notes = _read_notes(path.with_suffix(".toml"))
+    beside = path.with_suffix(".toml")
+    notes = read_notes(beside) if beside.is_file() else RunNotes()
     try:
         with path.open("rb") as stream:
-            return _run(
-                stream,
-                path.name,
-                noise={**notes.get("noise", {}), **(noise or {})},
-                description=notes.get("description", ""),
-            )
+            return _run(stream, path.name, {**notes.noise, **(noise or {})}, notes.description)
     except OSError as error:
         raise MeasurementError(
             f"{path}: the file cannot be read ({error.strerror}); check the path."
@@ -75,11 +66,11 @@ def read_run(path: str | Path, *, noise: Mapping[str, float] | None = None) -> R
 
 def parse_run(data: bytes, name: str, *, noise: Mapping[str, float] | None = None) -> Run:
     """Read the bytes of a measurement file; `name` is the run's name and heads every message."""
-    return _run(io.BytesIO(data), name, noise=noise or {}, description="")
+    return _run(io.BytesIO(data), name, noise or {}, "")
 
 
 def write_run(run: Run, path: str | Path) -> None:
-    """Write a run as CSV in SI; `read_run` returns the same values to 1e-11 of each."""
+    """Write a run as CSV in SI; `read_run` returns its values to 11 digits."""
     Path(path).write_text(run_to_csv(run), encoding="utf-8", newline="\n")
 
 
@@ -109,7 +100,7 @@ def require_for_identification(run: Run) -> None:
         )
 
 
-def _run(stream: BinaryIO, source: str, *, noise: Mapping[str, float], description: str) -> Run:
+def _run(stream: BinaryIO, source: str, noise: Mapping[str, float], description: str) -> Run:
     size = stream.seek(0, io.SEEK_END)
     if size > LARGEST_FILE:
         raise MeasurementError(
@@ -133,7 +124,7 @@ def _run(stream: BinaryIO, source: str, *, noise: Mapping[str, float], descripti
     warnings += _doubtful_time(time)
     for column in columns[1:]:
         warnings += _doubtful_magnitude(column, values[column.info.name])
-    return Run(source, time, values, _checked_noise(noise, source), tuple(warnings), description)
+    return Run(source, time, values, checked_noise(noise, source), tuple(warnings), description)
 
 
 def _columns(header: list[str], source: str) -> tuple[list[_Column], list[str]]:
@@ -145,64 +136,67 @@ def _columns(header: list[str], source: str) -> tuple[list[_Column], list[str]]:
         )
     found: dict[str, _Column] = {}
     others: list[tuple[int, str]] = []
-    without_unit: list[str] = []
     for index, title in enumerate(header):
-        match = _TITLE.fullmatch(title)
-        name = (match["name"] if match else title).strip().lower()
-        info = find_channel(name)
+        name, unit = split_title(title)
+        info = find_channel(name.lower())
         if info is None:
             others.append((index, title))
-            continue
-        if name in found:
+        elif info.name in found:
             raise MeasurementError(
-                f"{source}: columns {found[name].index + 1} and {index + 1} are both {name}; keep"
-                " one of them."
+                f"{source}: columns {found[info.name].index + 1} and {index + 1} are both"
+                f" {info.name}; keep one of them."
             )
-        unit = (match["unit"] if match else "") or ""
-        if not unit:
-            without_unit.append(name)
-        try:
-            factor, offset = to_si(unit or info.unit, info.unit)
-        except UnitError as error:
-            raise MeasurementError(
-                f"{source}: column {index + 1} ({title}): {error}; write a unit of"
-                f" {info.quantity} such as {name} [{info.display_unit}]."
-            ) from error
-        found[name] = _Column(index, info, title, unit, factor, offset)
-    ignored = [_ignored(index, title, found, source) for index, title in others]
-    if "time" not in found:
-        listed = ", ".join(repr(title) for title in header[:5])
+        else:
+            found[info.name] = _column(index, info, unit, source)
+    for index, title in others:
+        _refuse_misspelling(index, title, found, source)
+    _require_channels(header, found, source)
+    warnings = []
+    if bare := [f"{name} in {one.info.unit}" for name, one in found.items() if not one.unit]:
+        warnings.append(f"Columns without a unit were read as SI: {', '.join(bare)}.")
+    if others:
+        titles = [_shortened(title) if title else f"column {index + 1}" for index, title in others]
+        more = f" and {len(titles) - 8} more" if len(titles) > 8 else ""
+        warnings.append(
+            f"Columns that are no channels were left out: {', '.join(titles[:8])}{more}."
+        )
+    return sorted(found.values(), key=lambda column: column.info.name != "time"), warnings
+
+
+def _column(index: int, info: ChannelInfo, unit: str, source: str) -> _Column:
+    try:
+        factor, offset = to_si(unit or info.unit, info.unit)
+    except UnitError as error:
         raise MeasurementError(
-            f"{source}: no column is called time (the first line reads {listed}); name the columns"
-            " on the first line, such as time [s],chassis.z [mm]."
+            f"{source}: column {index + 1}, {info.name}: {error}; write a unit of {info.quantity}"
+            f" such as {info.name} [{info.display_unit}]."
+        ) from error
+    return _Column(index, info, unit, factor, offset)
+
+
+def _require_channels(header: list[str], found: Collection[str], source: str) -> None:
+    """Refuse a header without time or without any channel."""
+    if "time" not in found:
+        listed = ", ".join(_shortened(title) for title in header[:5])
+        raise MeasurementError(
+            f"{source}: no column is called time (the first line reads: {listed}); name the"
+            " columns on the first line, such as time [s],chassis.z [mm]."
         )
     if len(found) == 1:
         raise MeasurementError(
             f"{source}: no column besides time is a known channel; name them like"
-            " chassis.z [mm], wheel.fl.z [mm]."
+            " chassis.z [mm],wheel.fl.z [mm]."
         )
-    warnings = []
-    if without_unit:
-        units = ", ".join(f"{name} in {found[name].info.unit}" for name in without_unit)
-        warnings.append(f"No unit is given for some columns; read were {units}.")
-    if ignored:
-        shown = ", ".join(ignored[:8]) + (", ..." if len(ignored) > 8 else "")
-        warnings.append(f"Columns that are no channels were left out: {shown}.")
-    columns = sorted(found.values(), key=lambda column: column.info.name != "time")
-    return columns, warnings
 
 
-def _ignored(index: int, title: str, found: Mapping[str, Any], source: str) -> str:
-    """The title of a column to leave out; one that misspells a lacking channel is refused."""
-    match = _TITLE.fullmatch(title)
-    name = match["name"] if match else title
+def _refuse_misspelling(index: int, title: str, found: Collection[str], source: str) -> None:
+    name, _ = split_title(title)
     for known in CHANNELS:
-        if known not in found and _misspells(name, known):
+        if len(name) < 2 * len(known) and known not in found and _misspells(name, known):
             raise MeasurementError(
-                f"{source}: column {index + 1} is called {title!r}; did you mean {known}? Rename it"
-                " or remove it."
+                f"{source}: column {index + 1} is called {_shortened(title)}; did you mean"
+                f" {known}? Rename it or remove it."
             )
-    return title or f"number {index + 1}"
 
 
 def _misspells(name: str, known: str) -> bool:
@@ -211,10 +205,14 @@ def _misspells(name: str, known: str) -> bool:
     Words may be a little off and separators different. The short parts (z, a_x, fl) carry the
     meaning: they must hold the same letters, so that chassis.a_y is no slip for chassis.a_x.
     """
-    words, short = _parts(name)
-    known_words, known_short = _parts(known)
-    if "".join(re.findall(r"\w+", name.lower())) == "".join(re.findall(r"\w+", known)):
+    parts, known_parts = (re.findall(r"[a-z0-9]+", text.lower()) for text in (name, known))
+    if "".join(parts) == "".join(known_parts):
         return True
+    words, known_words = ([part for part in one if len(part) > 2] for one in (parts, known_parts))
+    short, known_short = (
+        {letter for part in one if len(part) <= 2 for letter in part}
+        for one in (parts, known_parts)
+    )
     return (
         short == known_short
         and len(words) == len(known_words)
@@ -225,12 +223,8 @@ def _misspells(name: str, known: str) -> bool:
     )
 
 
-def _parts(name: str) -> tuple[list[str], set[str]]:
-    """The words of a name, and the letters of its parts of one or two letters."""
-    parts = re.findall(r"[a-z0-9]+", name.lower())
-    return [part for part in parts if len(part) > 2], set(
-        "".join(part for part in parts if len(part) <= 2)
-    )
+def _shortened(title: str) -> str:
+    return title if len(title) <= 40 else f"{title[:37]}..."
 
 
 def _require_increasing(time: NDArray[np.float64], table: CsvTable, source: str) -> None:
@@ -254,51 +248,12 @@ def _doubtful_time(time: NDArray[np.float64]) -> list[str]:
 def _doubtful_magnitude(column: _Column, values: NDArray[np.float64]) -> list[str]:
     """A warning when a channel's greatest value makes its stated unit doubtful."""
     info, peak = column.info, float(np.max(np.abs(values)))
-    unit = column.unit or info.unit
-    shown = f"{peak / column.factor:.4g} {unit}"
+    shown = f"{peak / column.factor:.4g} {column.unit or info.unit}"
     if peak > info.largest:
-        other = info.display_unit if to_si(info.display_unit, info.unit)[0] < column.factor else ""
-        question = f"is it in {other}?" if other else "check its unit and that rest reads zero."
-        return [f"{info.name} reaches {shown}; {question}"]
+        smaller = to_si(info.display_unit, info.unit)[0] < column.factor
+        doubt = f"is it in {info.display_unit}?" if smaller else "check its unit and rest value."
+        return [f"{info.name} reaches {shown}; {doubt}"]
     if 0.0 < peak < info.smallest:
-        question = f"is it in {info.unit}?" if column.factor < 1.0 else "check its unit."
-        return [f"{info.name} stays within {shown}; {question}"]
+        doubt = f"is it in {info.unit}?" if column.factor < 1.0 else "check its unit."
+        return [f"{info.name} stays within {shown}; {doubt}"]
     return []
-
-
-def _checked_noise(noise: Mapping[str, float], source: str) -> dict[str, float]:
-    for name, value in noise.items():
-        try:
-            info = channel(name)
-        except MeasurementError as error:
-            raise MeasurementError(f"{source}: noise: {error}") from error
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not number or not 0.0 < value < float("inf"):
-            raise MeasurementError(
-                f"{source}: noise of {name} is {value!r}; give a positive number in {info.unit}."
-            )
-    return {name: float(value) for name, value in noise.items()}
-
-
-def _read_notes(path: Path) -> dict[str, Any]:
-    """The notes beside a recording: a table `noise`, a text `description`, and what others read."""
-    try:
-        text = path.read_bytes()[:_LARGEST_NOTES].decode("utf-8-sig")
-        notes = tomllib.loads(text)
-    except OSError:
-        return {}
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise MeasurementError(f"{path.name}: not valid TOML ({error}); correct it.") from error
-    for name in notes:
-        near = get_close_matches(name, ("noise", "description"), n=1, cutoff=0.75)
-        if near and near[0] != name:
-            raise MeasurementError(f"{path.name}: {name} is unknown; did you mean {near[0]}?")
-    if not isinstance(notes.get("description", ""), str):
-        raise MeasurementError(f"{path.name}: description must be a text in quotes.")
-    if not isinstance(notes.get("noise", {}), dict):
-        raise MeasurementError(f"{path.name}: noise must be a table [noise] of channel = number.")
-    try:
-        _checked_noise(notes.get("noise", {}), path.name)
-    except RideError as error:
-        raise MeasurementError(str(error)) from error
-    return notes

@@ -1,0 +1,89 @@
+"""What is known about a recording, in a TOML file beside it:
+
+    description = "Manoeuvre 2, wet road"
+
+    [noise]                  # standard deviation of the measurement noise by channel, SI
+    "chassis.z" = 0.0005     # the quotes may be left off
+
+Other keys are for other readers, such as the vehicle that was driven.
+"""
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from .channels import channel
+from .errors import MeasurementError
+
+LARGEST_FILE = 1_000_000
+"""Longest file of notes that is read, bytes."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunNotes:
+    """Noise in SI by channel, and a text for a person."""
+
+    noise: Mapping[str, float] = field(default_factory=dict)
+    description: str = ""
+
+
+def read_notes(path: Path) -> RunNotes:
+    """The notes in a file, checked; every message starts with the file's name."""
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(LARGEST_FILE + 1)
+    except OSError as error:
+        raise MeasurementError(
+            f"{path}: cannot be read ({error.strerror}); check the path."
+        ) from error
+    return parse_notes(data, path.name)
+
+
+def parse_notes(data: bytes, source: str) -> RunNotes:
+    """The notes in the bytes of a file; `source` heads every message."""
+    if len(data) > LARGEST_FILE:
+        raise MeasurementError(f"{source}: larger than 1 MB; notes hold noise and a description.")
+    try:
+        notes = tomllib.loads(data.decode("utf-8-sig").replace("\r\n", "\n"))
+    except (ValueError, RecursionError) as error:
+        raise MeasurementError(f"{source}: not valid TOML ({error}); correct it.") from error
+    for name in notes:
+        near = get_close_matches(name.lower(), ("noise", "description"), n=1, cutoff=0.75)
+        if near and near[0] != name:
+            raise MeasurementError(f"{source}: {name} is not known; did you mean {near[0]}?")
+    noise, description = notes.get("noise", {}), notes.get("description", "")
+    if not isinstance(description, str):
+        raise MeasurementError(f"{source}: description must be a text in quotes.")
+    if not isinstance(noise, dict):
+        raise MeasurementError(
+            f'{source}: noise must be a table: [noise] and lines such as "chassis.z" = 0.0005.'
+        )
+    return RunNotes(checked_noise(_flat(noise), source), description)
+
+
+def checked_noise(noise: Mapping[str, Any], source: str) -> dict[str, float]:
+    """Standard deviations by channel, each a positive number for a known channel."""
+    for name, value in noise.items():
+        try:
+            info = channel(name)
+        except MeasurementError as error:
+            raise MeasurementError(f"{source}: noise: {error}") from error
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not number or not 0.0 < value < math.inf:
+            raise MeasurementError(
+                f"{source}: noise of {name} is {value!r}; give a positive number in {info.unit}."
+            )
+    return {name: float(value) for name, value in noise.items()}
+
+
+def _flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """A table whose dotted keys were written without quotes, with the dots back in its keys."""
+    found: dict[str, Any] = {}
+    for name, value in table.items():
+        nested = isinstance(value, dict)
+        found |= _flat(value, f"{prefix}{name}.") if nested else {prefix + name: value}
+    return found

@@ -1,0 +1,56 @@
+import pytest
+from ridetune.engine.errors import MeasurementError
+from ridetune.engine.run_notes import LARGEST_FILE, checked_noise, parse_notes, read_notes
+
+
+def test_notes_state_noise_and_description():
+    notes = parse_notes(
+        b'description = "Monday"\nvehicle = "car.json"\n[noise]\n"chassis.z" = 0.0005\n', "r.toml"
+    )
+    assert notes.description == "Monday"
+    assert notes.noise == {"chassis.z": 0.0005}
+
+
+def test_quotes_around_a_channel_may_be_left_off():
+    text = b"[noise]\nchassis.z = 5e-4\nchassis.a_x = 1\nwheel.fl.z = 1e-3\r\n"
+    noise = {"chassis.z": 5e-4, "chassis.a_x": 1.0, "wheel.fl.z": 1e-3}
+    assert parse_notes(text, "r.toml").noise == noise
+
+
+def test_empty_notes_state_nothing():
+    assert parse_notes(b"", "r.toml").noise == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (b"[noise", "r.toml: not valid TOML (Expected ']'"),
+        (b"\xff", "r.toml: not valid TOML ("),
+        (b"a=" + b"[" * 100_000, "r.toml: not valid TOML ("),
+        (b" " * (LARGEST_FILE + 1), "r.toml: larger than 1 MB"),
+        (b"[nosie]\na = 1", "r.toml: nosie is not known; did you mean noise?"),
+        (b"noise = 3", "r.toml: noise must be a table"),
+        (b"description = 3", "r.toml: description must be a text"),
+        (b'[noise]\n"chassis.zz" = 1', "did you mean chassis.z?"),
+        (b'[noise]\n"chassis.z" = -1', "noise of chassis.z is -1; give a positive number in m"),
+        (b'[noise]\n"chassis.z" = "1 mm"', "noise of chassis.z is '1 mm'; give a positive"),
+        (b'[noise]\n"chassis.z" = true', "noise of chassis.z is True; give a positive"),
+        (b'[noise]\n"chassis.z" = nan', "noise of chassis.z is nan; give a positive"),
+        (b'[noise]\n"chassis.roll" = 0', "noise of chassis.roll is 0; give a positive"),
+    ],
+)
+def test_a_fault_in_the_notes_is_named(text, message):
+    with pytest.raises(MeasurementError) as caught:
+        parse_notes(text, "r.toml")
+    assert str(caught.value).startswith("r.toml: ")
+    assert message in str(caught.value)
+
+
+def test_notes_that_are_not_there_are_named(tmp_path):
+    with pytest.raises(MeasurementError, match=r"r\.toml: cannot be read"):
+        read_notes(tmp_path / "r.toml")
+
+
+def test_noise_given_otherwise_is_checked_the_same_way():
+    with pytest.raises(MeasurementError, match="run: noise of chassis.z is 0.0"):
+        checked_noise({"chassis.z": 0.0}, "run")
