@@ -1,0 +1,259 @@
+"""The car and the road as viser nodes, in the design position.
+
+The parts are made here; the page moves them, because the ride is played in the browser. Node
+names, and what a part's pose means, are therefore shared with static/poses.js:
+
+    /car/body                the sprung mass, origin at its CG, axes B
+    /car/wheel_fl ...        a wheel, origin at its centre
+    /car/arm_fl ...          bone 0 at the wheel centre, bone 1 at the pivot
+    /car/spring_fl, damper_  bone 0 at the wheel centre, bone 1 at the mount
+    /car/bar_front, bar_rear bone 0 on the left arm, bone 1 on the right arm
+    /ghost/body, wheel_fl    outlines of the car it is compared with
+    /road/surface, lines     the road, origin on the ground at X = 0; the page shapes it
+
+Everything is in an earth frame that travels with the car: X = 0 under its CG, Z = 0 flat ground.
+Arms, springs and dampers lie in the plane of their wheel; they are drawn INBOARD of it to be seen.
+"""
+
+from typing import Protocol
+
+import numpy as np
+from viser import SceneApi
+
+from ..engine.frames import AXLES, CORNERS, AxleName, Corner, axle_of, side_of
+from ..engine.vehicle import Vehicle
+from . import shapes
+
+INBOARD = 0.19
+TYRE_WIDTH = 0.20
+
+BODY = (148, 163, 184)
+EDGES = (230, 159, 0)
+TYRE = (38, 42, 48)
+RIM = (176, 184, 194)
+ARM = (196, 204, 214)
+SPRING = (204, 121, 167)
+DAMPER = (120, 128, 140)
+BAR = (0, 158, 115)
+GHOST = (86, 180, 233)
+ROAD = (52, 58, 66)
+MARKS = (108, 118, 130)
+SHADOW = (10, 12, 15)
+
+
+class Stage(Protocol):
+    """What of a ViserServer the car needs."""
+
+    scene: SceneApi
+
+
+def build(stage: Stage, vehicle: Vehicle) -> None:
+    """Make every node for a vehicle; nodes of the same name are replaced."""
+    for corner in CORNERS:
+        _corner(stage.scene, vehicle, corner)
+    for axle in AXLES:
+        _bar(stage.scene, vehicle, axle)
+    _body(stage.scene, vehicle)
+    _road(stage.scene)
+
+
+def wheel_centre(vehicle: Vehicle, corner: Corner) -> np.ndarray:
+    """Wheel centre at rest in the scene's frame, m."""
+    axle = vehicle.axle_at(corner)
+    forward = 1 if corner[0] == "f" else -1
+    return np.array(
+        [forward * axle.cg_distance, side_of(corner) * axle.track / 2, axle.wheel.radius]
+    )
+
+
+def pivot(vehicle: Vehicle, corner: Corner) -> np.ndarray:
+    """Pivot of a corner's arm at rest in the scene's frame, m."""
+    axle = vehicle.axle_at(corner)
+    forward = 1 if corner[0] == "f" else -1
+    x, y, _ = wheel_centre(vehicle, corner)
+    distance = axle.pivot.distance
+    return np.array([x - forward * distance, y, distance * np.tan(axle.pivot.angle)])
+
+
+def _corner(scene: SceneApi, vehicle: Vehicle, corner: Corner) -> None:
+    axle = vehicle.axle_at(corner)
+    radius, side = axle.wheel.radius, side_of(corner)
+    centre = wheel_centre(vehicle, corner)
+    name = f"/car/wheel_{corner}"
+    vertices, faces = shapes.tyre(radius, TYRE_WIDTH)
+    scene.add_mesh_simple(
+        name, vertices, faces, color=TYRE, position=centre, side="double", cast_shadow=False
+    )
+    vertices, faces = shapes.rim(radius, 0.9 * TYRE_WIDTH)
+    scene.add_mesh_simple(
+        f"{name}/rim",
+        vertices * (1, side, 1),
+        faces,
+        color=RIM,
+        side="double",
+        flat_shading=True,
+        cast_shadow=False,
+    )
+    hub = centre - (0, side * INBOARD, 0)
+    hinge = pivot(vehicle, corner) - (0, side * INBOARD, 0)
+    mount = hub + (0, 0, axle.suspension.mount_height)
+
+    arm = shapes.merge(
+        shapes.tube(hub, hinge, 0.028),
+        shapes.tube(hub - (0, 0.06, 0), hub + (0, 0.06, 0), 0.05),
+        shapes.tube(hinge - (0, 0.07, 0), hinge + (0, 0.07, 0), 0.055),
+    )
+    _stretched(scene, f"/car/arm_{corner}", arm, hub, hinge, ARM)
+
+    spring, share = shapes.coil(hub + (0, 0, 0.05), mount, 0.062, 0.009)
+    _stretched(scene, f"/car/spring_{corner}", spring, hub, mount, SPRING, share)
+
+    middle = (hub + mount) / 2
+    damper = shapes.merge(
+        shapes.tube(hub, middle, 0.034),
+        shapes.tube(hub + 0.3 * (mount - hub), mount, 0.016),
+        shapes.tube(mount, mount + (0, 0, 0.025), 0.075),
+    )
+    lower = len(shapes.tube(hub, middle, 0.034)[0])
+    share = np.arange(len(damper[0])) >= lower
+    _stretched(scene, f"/car/damper_{corner}", damper, hub, mount, DAMPER, share)
+
+    turn = np.linspace(0, 2 * np.pi, 33)
+    circle = radius * np.column_stack([np.cos(turn), np.zeros_like(turn), np.sin(turn)])
+    circle[:, 1] = side * TYRE_WIDTH / 2
+    scene.add_line_segments(
+        f"/ghost/wheel_{corner}",
+        _polyline(circle),
+        GHOST,
+        thickness=1.5,
+        thickness_units="screen",
+        position=centre,
+        visible=False,
+    )
+
+
+def _bar(scene: SceneApi, vehicle: Vehicle, axle: AxleName) -> None:
+    left, right = (_bar_end(vehicle, corner) for corner in CORNERS if axle_of(corner) == axle)
+    _stretched(scene, f"/car/bar_{axle}", shapes.tube(left, right, 0.014), left, right, BAR)
+
+
+def _bar_end(vehicle: Vehicle, corner: Corner) -> np.ndarray:
+    hub, hinge = wheel_centre(vehicle, corner), pivot(vehicle, corner)
+    return hub + 0.25 * (hinge - hub) - (0, side_of(corner) * INBOARD, 0)
+
+
+def _body(scene: SceneApi, vehicle: Vehicle) -> None:
+    front, rear = vehicle.front, vehicle.rear
+    width = max(front.track, rear.track) + TYRE_WIDTH
+    sections = shapes.body_sections(
+        vehicle.wheelbase, width, max(front.wheel.radius, rear.wheel.radius)
+    )
+    offset = np.array([front.cg_distance, 0, -vehicle.chassis.cg_height])
+    sections = [section + offset for section in sections]
+    at_rest = (0, 0, vehicle.chassis.cg_height)
+
+    vertices, faces = shapes.loft(sections, closed=False)
+    scene.add_mesh_simple(
+        "/car/body",
+        vertices,
+        faces,
+        color=BODY,
+        opacity=0.16,
+        side="double",
+        flat_shading=True,
+        cast_shadow=False,
+        position=at_rest,
+    )
+    edges = _edges(sections)
+    for name, colour, thickness in (
+        ("/car/body/edges", EDGES, 1.4),
+        ("/ghost/body", GHOST, 1.6),
+    ):
+        scene.add_line_segments(
+            name,
+            edges,
+            colour,
+            thickness=thickness,
+            thickness_units="screen",
+            position=at_rest if name == "/ghost/body" else (0, 0, 0),
+            visible=name != "/ghost/body",
+        )
+    floor = shapes.moved(
+        shapes.box((0.86 * vehicle.wheelbase, 0.62 * width, 0.04)),
+        ((front.cg_distance - rear.cg_distance) / 2, 0, 0.30 - vehicle.chassis.cg_height),
+    )
+    scene.add_mesh_simple(
+        "/car/body/floor", *floor, color=DAMPER, opacity=0.55, flat_shading=True, cast_shadow=False
+    )
+    scene.add_icosphere(
+        "/car/body/cg", radius=0.045, color=(240, 240, 240), subdivisions=2, cast_shadow=False
+    )
+    shadow = shapes.box((1.5 * vehicle.wheelbase, 1.02 * width, 0.002))
+    middle = (front.cg_distance - rear.cg_distance) / 2
+    scene.add_mesh_simple(
+        "/car/shadow",
+        *shadow,
+        color=SHADOW,
+        opacity=0.35,
+        position=(middle, 0, 0.004),
+        cast_shadow=False,
+    )
+
+
+def _road(scene: SceneApi) -> None:
+    x, y = np.array([-30.0, 60.0]), np.array([1.7, -1.7])
+    surface = [np.column_stack([np.full(2, station), y, np.zeros(2)]) for station in x]
+    scene.add_mesh_simple(
+        "/road/surface",
+        *shapes.loft(surface, closed=False),
+        color=ROAD,
+        side="double",
+        cast_shadow=False,
+        receive_shadow=False,
+    )
+    marks = np.array([[(station, 1.7, 0), (station, -1.7, 0)] for station in range(-30, 61, 2)])
+    scene.add_line_segments("/road/lines", marks, MARKS, thickness=1.2, thickness_units="screen")
+
+
+def _edges(sections: list[np.ndarray]) -> np.ndarray:
+    along = [np.array([section[k] for section in sections]) for k in range(6)]
+    x = np.array([section[0, 0] for section in sections])
+    tops = np.array([section[2, 2] - section[1, 2] for section in sections])
+    cabin = np.flatnonzero(tops > 1e-6)
+    roof = cabin[[int(np.argmax(tops[cabin] > 0.9 * tops.max()))]]
+    across = [0, cabin[0], int(roof[0]), cabin[-1], len(x) - 1]
+    return np.concatenate(
+        [*(_polyline(line) for line in along), *(_polyline(sections[k]) for k in across)]
+    )
+
+
+def _polyline(points: np.ndarray) -> np.ndarray:
+    return np.stack([points[:-1], points[1:]], axis=1)
+
+
+def _stretched(
+    scene: SceneApi,
+    name: str,
+    mesh: shapes.Mesh,
+    start: np.ndarray,
+    end: np.ndarray,
+    colour: tuple[int, int, int],
+    share: np.ndarray | None = None,
+) -> None:
+    """A part between two bones; `share` is how far each vertex goes with the second one."""
+    vertices, faces = mesh
+    if share is None:
+        along = (vertices - start) @ (end - start) / np.sum((end - start) ** 2)
+        share = along > 0.5
+    share = np.asarray(share, dtype=float)
+    scene.add_mesh_skinned(
+        name,
+        vertices,
+        faces,
+        bone_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)),
+        bone_positions=np.array([start, end]),
+        skin_weights=np.column_stack([1 - share, share]),
+        color=colour,
+        side="double",
+        cast_shadow=False,
+    )

@@ -1,0 +1,194 @@
+"""The 3D view: one viser server a session, shown through this service's own address.
+
+viser runs a websocket server of its own on a loopback port; nothing else of it is used. Its
+single-file page is served here with a bridge script in front of it, and only the websocket is
+passed on. So there is one origin and one port, and nobody gets at a car without its session.
+"""
+
+import asyncio
+import threading
+import time
+from functools import cache
+from pathlib import Path
+
+import rich
+import viser
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse
+from starlette.concurrency import run_in_threadpool
+from starlette.websockets import WebSocket
+from viser import _messages as messages
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed, WebSocketException
+
+from ..engine.vehicle import Vehicle
+from . import scene
+from .access import session_of
+from .errors import NotFound
+from .package_files import package_folder
+
+FOG = (18, 22, 27)
+MESSAGE_BYTES = 64 << 20
+UNWATCHED_SECONDS = 600.0
+"""How long a viewer without a tab is kept."""
+EYE, TARGET = (3.7, -4.6, 1.75), (0.0, 0.0, 0.45)
+
+router = APIRouter()
+
+
+class Viewer:
+    """One session's viser server and who watches it."""
+
+    def __init__(self):
+        rich.get_console().quiet = True
+        self.server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        self.watchers = 0
+        self.seen = time.monotonic()
+        # Any tab could ask for a public tunnel to this server.
+        self.server._websock_server.unregister_handler(messages.ShareUrlRequest)
+        self.server.gui.configure_theme(
+            dark_mode=True, show_logo=False, show_share_button=False, control_layout="floating"
+        )
+        self.server.initial_camera.position = EYE
+        self.server.initial_camera.look_at = TARGET
+        self.server.initial_camera.fov = 0.62
+        self.server.scene.world_axes.visible = False
+        self.server.scene.configure_default_lights(cast_shadow=False)
+        self.server.scene.configure_fog(14.0, 60.0, color=FOG)
+
+    @property
+    def address(self) -> str:
+        """Where the relay connects to."""
+        return f"ws://127.0.0.1:{self.server.get_port()}"
+
+
+class Viewers:
+    """The viewers of all sessions; every method may be called from any thread."""
+
+    def __init__(self):
+        self._viewers: dict[str, Viewer] = {}
+        self._lock = threading.Lock()
+
+    def start(self, sid: str) -> Viewer:
+        """The session's viewer, started when there is none."""
+        with self._lock:
+            if sid not in self._viewers:
+                self._viewers[sid] = Viewer()
+            viewer = self._viewers[sid]
+            viewer.seen = time.monotonic()
+            return viewer
+
+    def show(self, sid: str, vehicle: Vehicle) -> None:
+        """Put a vehicle on the stage; the browser shapes the road from the histories."""
+        server = self.start(sid).server
+        with server.atomic():
+            scene.build(server, vehicle)
+
+    def watch(self, sid: str, tabs: int) -> Viewer:
+        """Count a tab in (+1) or out (-1)."""
+        viewer = self.start(sid)
+        with self._lock:
+            viewer.watchers += tabs
+        return viewer
+
+    def stop(self, sid: str) -> None:
+        """End a session's viewer, if it has one."""
+        with self._lock:
+            viewer = self._viewers.pop(sid, None)
+        if viewer:
+            viewer.server.stop()
+
+    def reap(self) -> None:
+        """Stop the viewers that nobody has watched for a while; a returning tab starts anew."""
+        late = time.monotonic() - UNWATCHED_SECONDS
+        with self._lock:
+            idle = [sid for sid, v in self._viewers.items() if v.watchers <= 0 and v.seen < late]
+        for sid in idle:
+            self.stop(sid)
+
+    def close(self) -> None:
+        """Stop every viewer."""
+        for sid in list(self._viewers):
+            self.stop(sid)
+
+
+@cache
+def _client_page() -> str:
+    build = Path(viser.__file__).parent / "client" / "build" / "index.html"
+    return build.read_text(encoding="utf-8")
+
+
+@router.get("/s/{sid}/viewer/", include_in_schema=False)
+def page(request: Request, sid: str) -> HTMLResponse:
+    session_of(request, sid)
+    static = package_folder("static")
+    bridge = (static / "bridge.js").read_text(encoding="utf-8")
+    style = (static / "bridge.css").read_text(encoding="utf-8")
+    head = f"<script>{bridge}</script><style>{style}</style>"
+    html = _client_page().replace('<meta charset="utf-8" />', f'<meta charset="utf-8" />{head}', 1)
+    # The client needs inline and evaluated script (WebAssembly glue). What must not happen is
+    # that it talks to another server: ?websocket= would let a stranger's scene run in our origin.
+    policy = (
+        "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' blob:; "
+        "worker-src blob:; style-src 'unsafe-inline'; img-src 'self' data: blob:; "
+        "font-src data:; connect-src 'self' data: blob:; base-uri 'none'; form-action 'none'; "
+        "frame-ancestors 'self'"
+    )
+    return HTMLResponse(html, headers={"Content-Security-Policy": policy})
+
+
+@router.websocket("/s/{sid}/viewer")
+async def relay(websocket: WebSocket, sid: str) -> None:
+    viewers: Viewers = websocket.app.state.services.viewers
+    try:
+        await run_in_threadpool(session_of, websocket, sid)
+    except NotFound:
+        await websocket.close(1008)
+        return
+    viewer = await run_in_threadpool(viewers.watch, sid, 1)
+    try:
+        await _pass_on(websocket, viewer.address)
+    except (OSError, WebSocketException):
+        await websocket.close(1013, "The 3D view is restarting.")
+    finally:
+        viewer.watchers -= 1
+        viewer.seen = time.monotonic()
+
+
+async def _pass_on(websocket: WebSocket, address: str) -> None:
+    """Carry messages both ways until either side hangs up."""
+    offered = [p for p in websocket.scope["subprotocols"] if p.startswith("viser-v")][:1]
+    async with connect(
+        address,
+        subprotocols=offered or None,
+        compression=None,
+        max_size=MESSAGE_BYTES,
+        ping_interval=None,
+        proxy=None,
+    ) as upstream:
+        await websocket.accept(subprotocol=upstream.subprotocol)
+        ways = [
+            asyncio.create_task(_to_viser(websocket, upstream)),
+            asyncio.create_task(_to_browser(websocket, upstream)),
+        ]
+        try:
+            await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for way in ways:
+                way.cancel()
+            await asyncio.gather(*ways, return_exceptions=True)
+
+
+async def _to_viser(websocket: WebSocket, upstream: ClientConnection) -> None:
+    while (message := await websocket.receive())["type"] != "websocket.disconnect":
+        data = message.get("bytes")
+        await upstream.send(message["text"] if data is None else data)
+
+
+async def _to_browser(websocket: WebSocket, upstream: ClientConnection) -> None:
+    try:
+        async for message in upstream:
+            await websocket.send_bytes(message if isinstance(message, bytes) else message.encode())
+    except ConnectionClosed:
+        pass
+    await websocket.close(1012)

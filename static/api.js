@@ -1,0 +1,152 @@
+// The only module that talks to the service. Everything is SI here.
+//
+// A run is {time: Float32Array, values: {channel: Float32Array}, head}.
+
+const FRAMES = "application/vnd.ridetune.frames";
+
+/** A refusal of the service (RFC 9457) in words for a person, or a lost connection. */
+export class Refusal extends Error {
+  constructor(problem, status = 0) {
+    super(problem.detail ?? problem.title ?? "The service did not say why.");
+    this.title = problem.title ?? "The service refused";
+    this.code = problem.code ?? "";
+    this.field = problem.field ?? null;
+    this.status = status;
+    this.lost = status === 0;
+  }
+}
+
+let base = "";
+
+/** Which session all further calls are about. */
+export function useSession(id) {
+  base = `/api/sessions/${encodeURIComponent(id)}`;
+}
+
+async function call(method, url, { body, accept = "application/json", signal } = {}) {
+  const init = { method, headers: { Accept: accept }, signal };
+  if (body instanceof FormData) init.body = body;
+  else if (body !== undefined) {
+    init.body = JSON.stringify(body);
+    init.headers["Content-Type"] = "application/json";
+  }
+  let reply;
+  try {
+    reply = await fetch(url, init);
+  } catch (error) {
+    if (error.name === "AbortError") throw error;
+    throw new Refusal({ title: "No connection", detail: "The service does not answer." });
+  }
+  if (!reply.ok) throw await refusal(reply);
+  return reply;
+}
+
+async function refusal(reply) {
+  let problem;
+  try {
+    problem = await reply.json();
+  } catch {
+    problem = { title: `HTTP ${reply.status}`, detail: "The service failed without a reason." };
+  }
+  return new Refusal(problem, reply.status);
+}
+
+const json = async (...args) => {
+  const reply = await call(...args);
+  return reply.status === 204 ? null : reply.json();
+};
+
+/** Bytes of the frames format as a run. */
+export function decode(buffer) {
+  const length = new DataView(buffer).getUint32(0, true);
+  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  const values = {};
+  let offset = 4 + length;
+  for (const { name } of head.channels) {
+    values[name] = new Float32Array(buffer, offset, head.samples);
+    offset += 4 * head.samples;
+  }
+  return { time: values.time, values, head };
+}
+
+async function frames(...args) {
+  return decode(await (await call(...args)).arrayBuffer());
+}
+
+// The service's tables
+/** {state, message}; a 503 while compiling is an answer, not a failure. */
+export async function readiness() {
+  let reply;
+  try {
+    reply = await fetch("/readyz");
+  } catch {
+    throw new Refusal({ title: "No connection", detail: "The service does not answer." });
+  }
+  const answer = await reply.json().catch(() => ({}));
+  return { state: answer.state ?? (reply.ok ? "ready" : "compiling"), ...answer };
+}
+export const parameters = () => json("GET", "/api/parameters");
+export const channels = () => json("GET", "/api/channels");
+export const vehicles = () => json("GET", "/api/vehicles");
+export const referenceVehicle = (key) => json("GET", `/api/vehicles/${encodeURIComponent(key)}`);
+export const manoeuvres = () => json("GET", "/api/manoeuvres");
+export const roads = () => json("GET", "/api/roads");
+
+// The session
+export const session = () => json("GET", base);
+export const saveVehicle = (vehicle) => json("PUT", `${base}/vehicle`, { body: vehicle });
+export const saveBaseline = (vehicle) => json("PUT", `${base}/baseline`, { body: vehicle });
+export const simulate = (body) =>
+  frames("POST", `${base}/simulations`, { body, accept: FRAMES });
+export async function simulateFile(body) {
+  return (await call("POST", `${base}/simulations`, { body, accept: "text/csv" })).blob();
+}
+
+// Measurements
+export function upload(file) {
+  const form = new FormData();
+  form.append("file", file, file.name);
+  return json("POST", `${base}/measurements`, { body: form });
+}
+export const measurements = () => json("GET", `${base}/measurements`);
+export const deleteMeasurement = (id) => json("DELETE", `${base}/measurements/${id}`);
+export const originalUrl = (id) => `${base}/measurements/${id}/original`;
+export function measurement(id, channelNames, maxSamples, decimate = "stride") {
+  const query = new URLSearchParams({ max_samples: maxSamples, decimate });
+  if (channelNames) query.set("channels", channelNames.join(","));
+  return frames("GET", `${base}/measurements/${id}/frames?${query}`, { accept: FRAMES });
+}
+
+// Identifications
+export const identify = (body) => json("POST", `${base}/identifications`, { body });
+export const identification = (id) => json("GET", `${base}/identifications/${id}`);
+export const cancelIdentification = (id) =>
+  json("POST", `${base}/identifications/${id}/cancel`);
+
+/** Follow a job: onProgress(progress), onState(job). Returns a function that stops following. */
+export function follow(id, onProgress, onState) {
+  const source = new EventSource(`${base}/identifications/${id}/events`);
+  source.addEventListener("progress", (event) => onProgress(JSON.parse(event.data)));
+  source.addEventListener("state", (event) => {
+    const job = JSON.parse(event.data);
+    if (isFinal(job.state)) source.close();
+    onState(job);
+  });
+  // EventSource reconnects by itself; when the service refuses for good, one look tells the end.
+  source.addEventListener("error", () => {
+    if (source.readyState !== EventSource.CLOSED) return;
+    setTimeout(async () => {
+      try {
+        const job = await identification(id);
+        onState(job);
+        if (!isFinal(job.state)) stop = follow(id, onProgress, onState);
+      } catch (error) {
+        if (error.lost) source.dispatchEvent(new Event("error"));
+      }
+    }, 2000);
+  });
+  let stop = () => source.close();
+  return () => stop();
+}
+
+export const isFinal = (state) => ["done", "failed", "cancelled"].includes(state);

@@ -1,0 +1,298 @@
+// Linked charts of the ride: measured, compared car and now, one time cursor for all and for 3D.
+
+import { $, debounced, h, tabs } from "./dom.js";
+import { CORNERS, locate } from "./poses.js";
+import { density } from "./spectrum.js";
+import { get, on } from "./store.js";
+import { clock, onTime, seek } from "./timeline.js";
+import * as units from "./units.js";
+
+const SPECTRUM = "spectrum of ";
+const GROUPS = {
+  body: ["Body", ["chassis.z", "chassis.pitch", "chassis.roll"]],
+  travel: ["Travel", CORNERS.map((c) => `suspension.${c}.travel`)],
+  tyre: ["Tyre load", CORNERS.map((c) => `tyre.${c}.load`)],
+  seat: ["Seat", ["seat.driver.a_z", `${SPECTRUM}seat.driver.a_z`, "chassis.a_x", "chassis.v_x"]],
+};
+// Okabe and Ito's colours: told apart with any colour vision, and by their strokes as well.
+const RUNS = [
+  { key: "measured", label: "measured", stroke: "#c9ced6", width: 1, dash: [] },
+  { key: "reference", label: "baseline", stroke: "#56b4e9", width: 1.2, dash: [6, 4] },
+  { key: "now", label: "now", stroke: "#e69f00", width: 1.6, dash: [] },
+];
+const SYNC = "ride";
+const BOTTOM_AXIS = 38;
+const BARE_AXIS = 10;
+const CLICK_PIXELS = 4;
+
+let group = "body";
+let charts = [];
+let hover = null;
+let onGroup = () => {};
+/** Time span that the charts show, or null for all of it. */
+let zoom = null;
+
+/** Channels that the visible charts need. */
+export const visibleChannels = () =>
+  GROUPS[group][1].map((name) => name.replace(SPECTRUM, ""));
+
+/** Every channel that some chart shows. */
+export const allChannels = () =>
+  Object.values(GROUPS).flatMap(([, names]) => names).filter((name) => !name.startsWith(SPECTRUM));
+
+/** What the browser tests look at: {channel: {measured, reference, now}} as drawn. */
+export const drawn = () =>
+  Object.fromEntries(charts.map(({ name, plot }) => [name,
+    Object.fromEntries(RUNS.map(({ key }, i) => [key, Array.from(plot.data[i + 1])]))]));
+export const zoomed = () => zoom;
+
+/** Build the tabs; `changed` is called when other channels are needed. */
+export function build(changed) {
+  const list = $("#chart-tabs");
+  for (const [key, [title]] of Object.entries(GROUPS)) {
+    list.append(h("button", {
+      role: "tab", type: "button", id: `charts-${key}`, "aria-controls": "chart-area",
+    }, title));
+  }
+  list.append(h("span", { className: "legend-line", id: "legend" }));
+  legend();
+  tabs(list, (id) => {
+    group = id.replace("charts-", "");
+    lay();
+    onGroup();
+  });
+  onGroup = changed;
+  on("now reference measured", fill);
+  on("compare ride", legend);
+  onTime(cursor);
+  new ResizeObserver(debounced(resize, 60)).observe($("#chart-area"));
+}
+
+/** The charts begin anew at full length when another ride is chosen. */
+export function showAll() {
+  zoom = null;
+  fill();
+}
+
+function legend() {
+  const other = { baseline: "baseline", "7dof": "7-DOF model", none: null }[get("compare")];
+  $("#legend").replaceChildren(
+    ...RUNS.map(({ key, label }) => [key, key === "reference" ? other : label])
+      .filter(([key, text]) => text && (key !== "measured" || get("ride")?.kind === "measurement"))
+      .map(([key, text]) => h("span", { className: `key ${key}` }, text)),
+  );
+}
+
+function lay() {
+  charts.forEach(({ plot }) => plot.destroy());
+  const area = $("#chart-area");
+  area.replaceChildren();
+  const names = GROUPS[group][1];
+  charts = names.map((name, i) => chart(name, i === names.length - 1, area));
+  resize();
+  fill();
+}
+
+function chart(name, bottom, area) {
+  const spectrum = name.startsWith(SPECTRUM);
+  const row = units.channel(name.replace(SPECTRUM, ""));
+  const factor = spectrum ? row.display_factor ** 2 : row.display_factor;
+  const unit = spectrum ? `(${row.display_unit})²/Hz` : row.display_unit;
+  const title = spectrum ? `Spectrum of ${row.label}` : capital(row.label);
+  const values = RUNS.map(({ key }) => h("span", { className: `reading ${key}` }));
+  const box = h("figure", { className: "chart", dataset: { channel: name } },
+    h("figcaption", {}, h("span", { className: "chart-title" }, `${title} `,
+      h("span", { className: "unit" }, unit)), h("span", { className: "readings" }, values)),
+    h("p", { className: "chart-empty", hidden: true }));
+  area.append(box);
+  const plot = new window.uPlot(options(name, spectrum, bottom || spectrum), [[], [], [], []], box);
+  const line = h("div", { className: "time-line" });
+  if (!spectrum) plot.over.append(line);
+  plot.root.setAttribute("role", "img");
+  plot.root.setAttribute("aria-label", `${title} over ${spectrum ? "frequency" : "time"}`);
+  return { name, spectrum, bottom: bottom || spectrum, plot, box, line, values, factor };
+}
+
+function options(name, spectrum, labelled) {
+  const axis = {
+    stroke: "#93a0ae", font: "11px system-ui, sans-serif",
+    grid: { stroke: "#2a323c", width: 1 }, ticks: { stroke: "#2a323c", width: 1, size: 4 },
+  };
+  const config = {
+    width: 300, height: 120, legend: { show: false }, padding: [6, 10, 0, 0],
+    scales: {
+      x: spectrum ? { time: false, distr: 3 } : { time: false },
+      y: spectrum ? { distr: 3 } : { range: room },
+    },
+    axes: [
+      { ...axis, size: labelled ? BOTTOM_AXIS : BARE_AXIS, gap: 3, labelSize: 14,
+        label: labelled ? (spectrum ? "frequency, Hz" : "time, s") : undefined,
+        labelFont: axis.font, labelGap: 0, values: labelled ? undefined : (_, s) => s.map(() => "") },
+      { ...axis, size: 46, gap: 4 },
+    ],
+    series: [{}, ...RUNS.map(({ label, stroke, width, dash }) => ({
+      label, stroke, width, dash, points: { show: false }, spanGaps: false,
+    }))],
+    cursor: { points: { show: false }, drag: { x: true, y: false, setScale: true } },
+    hooks: { setCursor: [pointed], ready: [clickable] },
+  };
+  if (spectrum) {
+    const decades = (_, splits) => splits.map((v) => {
+      const power = Math.log10(v);
+      return Math.abs(power - Math.round(power)) < 1e-6 ? power10(Math.round(power)) : null;
+    });
+    config.axes[0].values = decades;
+    config.axes[1].values = decades;
+    config.cursor.drag = { x: false, y: false };
+    config.cursor.show = false;
+    config.hooks = {};
+  } else {
+    config.cursor.sync = { key: SYNC, setSeries: false };
+    config.hooks.setScale = [(plot, key) => key === "x" && zoomedTo(plot)];
+  }
+  return config;
+}
+
+const power10 = (power) =>
+  power >= -2 && power <= 3
+    ? String(10 ** power)
+    : `10${String(power).replace(/./g, (c) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)])}`;
+
+/** A little air above and below; a flat line lies in the middle. */
+function room(_, low, high) {
+  if (low === null || high === null) return [-1, 1];
+  const air = Math.max((high - low) * 0.08, Math.abs(high) * 1e-3, 1e-6);
+  return [low - air, high + air];
+}
+
+/** Draw the runs on the grid of the first that is there. */
+function fill() {
+  const runs = RUNS.map(({ key }) => get(key));
+  const base = get("now") ?? get("reference") ?? get("measured");
+  for (const entry of charts) {
+    const { name, spectrum, plot, box, factor } = entry;
+    const channel = name.replace(SPECTRUM, "");
+    const lines = runs.map((run) => run?.values[channel] ?? null);
+    const empty = box.querySelector(".chart-empty");
+    empty.hidden = !base || lines.some(Boolean);
+    empty.textContent = base?.head.mode === "rims" && channel.startsWith("tyre.")
+      ? "Not in this ride: with measured rims the tyres play no part. Choose a manoeuvre."
+      : "Not in this ride.";
+    if (spectrum) {
+      fillSpectrum(entry, runs, channel);
+      continue;
+    }
+    const x = base ? base.time : [];
+    plot.batch(() => {
+      plot.setData([x, ...runs.map((run, i) => onGrid(run, lines[i], base, factor))], false);
+      const [min, max] = zoom ?? [x[0] ?? 0, x[x.length - 1] ?? 1];
+      plot.setScale("x", { min, max });
+    });
+  }
+  cursor();
+}
+
+function fillSpectrum({ plot, factor }, runs, channel) {
+  const spectra = runs.map((run) =>
+    run?.values[channel] ? density(run.time, run.values[channel]) : null);
+  const first = spectra.find(Boolean);
+  if (!first) {
+    plot.setData([[], [], [], []]);
+    return;
+  }
+  const keep = first.frequency.map((f, i) => i).filter((i) => first.frequency[i] <= 30);
+  plot.setData([
+    keep.map((i) => first.frequency[i]),
+    ...spectra.map((s) => keep.map((i) =>
+      s && s.frequency.length === first.frequency.length ? s.density[i] * factor : null)),
+  ]);
+}
+
+function onGrid(run, values, base, factor) {
+  if (!values) return Array(base ? base.time.length : 0).fill(null);
+  const same = run.time.length === base.time.length &&
+    Math.abs(run.time[1] - base.time[1]) < 1e-6 && run.time[0] === base.time[0];
+  const shown = (v) => (Number.isFinite(v) ? v * factor : null);
+  if (same) return Array.from(values, shown);
+  const last = run.time[run.time.length - 1];
+  return Array.from(base.time, (t) => {
+    if (t < run.time[0] - 1e-6 || t > last + 1e-6) return null;
+    const [i, w] = locate(run.time, t);
+    return shown(w ? (1 - w) * values[i] + w * values[i + 1] : values[i]);
+  });
+}
+
+function zoomedTo(plot) {
+  const x = plot.data[0];
+  if (!x.length) return;
+  const { min, max } = plot.scales.x;
+  const whole = min <= x[0] + 1e-9 && max >= x[x.length - 1] - 1e-9;
+  const span = whole ? null : [min, max];
+  if (String(span) === String(zoom)) {
+    cursor();
+    return;
+  }
+  zoom = span;
+  for (const { plot: other, spectrum } of charts) {
+    if (other !== plot && !spectrum) other.setScale("x", { min, max });
+  }
+  cursor();
+}
+
+function pointed(plot) {
+  const at = plot.cursor.left >= 0 ? plot.posToVal(plot.cursor.left, "x") : null;
+  hover = at;
+  readings();
+}
+
+/** A click without a drag goes to that time. */
+function clickable(plot) {
+  let from = 0;
+  plot.over.addEventListener("mousedown", (event) => { from = event.clientX; });
+  plot.over.addEventListener("mouseup", (event) => {
+    if (Math.abs(event.clientX - from) > CLICK_PIXELS) return;
+    seek(plot.posToVal(event.clientX - plot.over.getBoundingClientRect().left, "x"));
+  });
+}
+
+function cursor() {
+  for (const { plot, line, spectrum } of charts) {
+    if (spectrum || !plot.data[0].length) continue;
+    const { min, max } = plot.scales.x;
+    const inside = clock.time >= min && clock.time <= max;
+    line.hidden = !inside;
+    if (inside) line.style.transform = `translateX(${plot.valToPos(clock.time, "x")}px)`;
+  }
+  readings();
+}
+
+/** Numbers at the pointer, else at the time of the ride. */
+function readings() {
+  const t = hover ?? clock.time;
+  for (const { plot, values, spectrum } of charts) {
+    if (spectrum || !plot.data[0].length) continue;
+    const [i, w] = locate(plot.data[0], t);
+    values.forEach((element, k) => {
+      const value = plot.data[k + 1]?.[w > 0.5 ? i + 1 : i];
+      const text = value === null || value === undefined ? "" : units.number(value, 3);
+      if (element.textContent !== text) element.textContent = text;
+    });
+  }
+}
+
+function resize() {
+  const area = $("#chart-area");
+  if (!charts.length || !area.clientWidth) return;
+  const captions = charts.reduce((sum, c) => sum + c.box.firstChild.offsetHeight + 4, 0);
+  const axes = charts.reduce((sum, c) => sum + (c.bottom ? BOTTOM_AXIS : BARE_AXIS), 0);
+  const each = Math.max((area.clientHeight - captions - axes - 6 * charts.length) / charts.length, 48);
+  for (const { plot, bottom } of charts) {
+    plot.setSize({
+      width: area.clientWidth,
+      height: Math.floor(each) + (bottom ? BOTTOM_AXIS : BARE_AXIS) + 6,
+    });
+  }
+  cursor();
+}
+
+const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);

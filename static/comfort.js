@@ -1,0 +1,84 @@
+// Comfort and road holding in numbers: now against the car it is compared with.
+
+import { $, h } from "./dom.js";
+import { get, on } from "./store.js";
+import * as units from "./units.js";
+
+const SAME = 0.0005;
+
+export function build() {
+  on("now reference measured compare", show);
+  show();
+}
+
+function show() {
+  const now = get("now")?.head;
+  const other = get("reference")?.head;
+  const panel = $("#comfort");
+  if (!now) {
+    panel.replaceChildren(h("p", { className: "empty" },
+      get("trouble") ?? "The numbers come with the first simulation."));
+    return;
+  }
+  const name = get("compare") === "7dof" ? "7-DOF model" : "Baseline";
+  const rows = now.metrics.map((metric) => row(metric, find(other, metric.name)));
+  const table = h("table", { className: "metrics" },
+    h("thead", {}, h("tr", {},
+      h("th", { scope: "col" }, "Metric of the ride"), h("th", { scope: "col" }, name),
+      h("th", { scope: "col" }, "Now"), h("th", { scope: "col" }, "Unit"),
+      h("th", { scope: "col" }, "Change"))),
+    h("tbody", {}, rows));
+  panel.replaceChildren(...[fits(now, other, name), table, warnings(now)].filter(Boolean));
+}
+
+const find = (head, name) => head?.metrics.find((metric) => metric.name === name);
+
+function row(metric, before) {
+  const factor = metric.display_factor ?? 1;
+  const change = before && Math.abs(before.value) > 1e-12
+    ? (metric.value - before.value) / Math.abs(before.value) : null;
+  return h("tr", {},
+    h("th", { scope: "row" }, metric.label),
+    h("td", {}, before ? units.number(before.value * factor, 3) : "–"),
+    h("td", {}, units.number(metric.value * factor, 3)),
+    h("td", { className: "unit" }, metric.display_unit ?? metric.unit),
+    changed(change));
+}
+
+/** Less is better in every metric; arrows say it without colour. */
+function changed(change) {
+  if (change === null) return h("td", {}, "–");
+  if (Math.abs(change) < SAME) return h("td", { className: "same" }, "same");
+  const less = change < 0;
+  const size = Math.abs(change) >= 9.995 ? `×${units.number(1 + change, 3)}`
+    : `${units.number(100 * Math.abs(change), 2)} %`;
+  return h("td", { className: less ? "less" : "more" }, `${less ? "▼" : "▲"} ${size}`);
+}
+
+/** How far the simulated motion follows the measured one. */
+function fits(now, other, name) {
+  const channels = Object.keys(now.fit_percent ?? {});
+  if (!channels.length) return null;
+  const cells = (head) => channels.map((channel) =>
+    h("td", {}, head && channel in head.fit_percent ? percent(head.fit_percent[channel]) : "–"));
+  return h("table", { className: "fits" },
+    h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Follows the measurement"),
+      channels.map((channel) => h("th", { scope: "col" }, short(channel))))),
+    h("tbody", {},
+      other ? h("tr", {}, h("th", { scope: "row" }, name), cells(other)) : null,
+      h("tr", { className: "strong" }, h("th", { scope: "row" }, "Now"), cells(now))));
+}
+
+export const short = (channel) => channel.replace("chassis.", "");
+/** A fit in percent; far below zero only says that it does not follow at all. */
+export const percent = (value) => (value < -999 ? "< −999 %" : `${units.number(value, 3)} %`);
+
+function warnings(now) {
+  const share = Math.max(0, ...Object.values(now.negative_load_share ?? {}));
+  const texts = [...(now.warnings ?? [])];
+  if (share > 0) {
+    texts.push(`A tyre pulls on the road during ${units.number(100 * share, 2)} % of the time: ` +
+      "a real wheel would leave it there.");
+  }
+  return texts.length ? h("ul", { className: "warnings" }, texts.map((t) => h("li", {}, t))) : null;
+}

@@ -1,0 +1,184 @@
+// The twelve sliders, made from the service's table of parameters.
+//
+// The truth is `values` of the store (SI); a slider shows it, clamped to its range. On each track
+// lie the baseline (a tick) and, after a fit, the 95 % interval of the identified value (a band).
+
+import { $, h, symbol } from "./dom.js";
+import { get, on, set } from "./store.js";
+import * as units from "./units.js";
+
+const GROUPS = { front: "Front axle", rear: "Rear axle" };
+const THUMB = 14;
+export const DETERMINED = {
+  yes: "well determined",
+  weakly: "weakly determined",
+  no: "not determined",
+};
+const rows = new Map();
+
+export const valueAt = (vehicle, path) => path.split(".").reduce((part, key) => part[key], vehicle);
+
+/** The vehicle with the given {path: value} in it. */
+export function withValues(vehicle, values) {
+  const copy = structuredClone(vehicle);
+  for (const [path, value] of Object.entries(values)) {
+    const keys = path.split(".");
+    const last = keys.pop();
+    keys.reduce((part, key) => part[key], copy)[last] = value;
+  }
+  return copy;
+}
+
+/** {path: value} of the parameters in a vehicle. */
+export const valuesOf = (vehicle) =>
+  Object.fromEntries(get("parameters").map(({ name }) => [name, valueAt(vehicle, name)]));
+
+/** Build the panel once the table is here. */
+export function build({ onBaseline }) {
+  const panel = $("#parameters");
+  panel.append(
+    h("div", { className: "panel-head" },
+      h("h2", {}, "Parameters"),
+      h("button", {
+        type: "button", id: "reset-all", title: "Every slider back to the baseline",
+        on: { click: () => set({ values: valuesOf(get("baseline")) }) },
+      }, "Reset"),
+      h("button", {
+        type: "button", id: "set-baseline",
+        title: "Take the sliders' values as the baseline to compare with",
+        on: { click: onBaseline },
+      }, "Set baseline")),
+  );
+  for (const [side, title] of Object.entries(GROUPS)) {
+    const group = h("fieldset", {}, h("legend", {}, title));
+    for (const parameter of get("parameters")) {
+      if (parameter.name.startsWith(`${side}.`)) group.append(row(parameter, side));
+    }
+    panel.append(group);
+  }
+  panel.append(
+    h("p", { className: "track-legend" },
+      h("span", { className: "mark-baseline" }, "baseline"),
+      h("span", { className: "mark-interval" }, "95 % interval of the fit")),
+  );
+  on("values baseline fit", show);
+  show();
+}
+
+function row(parameter, side) {
+  const { name, display_factor: factor, display_unit: unit } = parameter;
+  const label = plainLabel(parameter, side);
+  const id = name.replaceAll(".", "-");
+  const lower = parameter.slider_lower * factor;
+  const upper = parameter.slider_upper * factor;
+  const step = Number((parameter.step * factor).toPrecision(3));
+  const change = (shown) => {
+    if (Number.isFinite(shown)) set({ values: { ...get("values"), [name]: shown / factor } });
+  };
+  const slider = h("input", {
+    type: "range", id: `slider-${id}`, min: lower, max: upper, step: "any",
+    "aria-label": `${parameter.label}, ${unit}`,
+    on: {
+      input: () => {
+        const raw = Number(slider.value);
+        change(raw <= lower || raw >= upper ? raw : Math.round(raw / step) * step);
+      },
+      keydown: (event) => nudge(event, slider, step, lower, upper, change),
+    },
+  });
+  const field = h("input", {
+    type: "number", id: `value-${id}`, step: "any", inputMode: "decimal",
+    on: {
+      input: () => field.value !== "" && change(Number(field.value)),
+      change: show,
+    },
+  });
+  const parts = {
+    parameter, slider, field, lower, upper,
+    baseline: h("span", { className: "tick" }),
+    interval: h("span", { className: "interval" }),
+    spread: h("span", { className: "spread" }),
+    reset: h("button", {
+      type: "button", className: "reset", "aria-label": `Reset ${parameter.label}`,
+      on: {
+        click: () =>
+          set({ values: { ...get("values"), [name]: valueAt(get("baseline"), name) } }),
+      },
+    }, "↺"),
+  };
+  rows.set(name, parts);
+  parts.element = h("div", { className: "parameter", dataset: { name } },
+    h("label", { htmlFor: field.id, title: parameter.label }, symbol(parameter.symbol), " ", label),
+    field, h("span", { className: "unit" }, unit),
+    h("div", { className: "track" }, parts.interval, slider, parts.baseline),
+    h("div", { className: "after" }, parts.spread, parts.reset));
+  return parts.element;
+}
+
+/** "Front spring stiffness" under "Front axle" is "spring stiffness". */
+export function plainLabel(parameter, side) {
+  const text = parameter.label.replace(new RegExp(`^${side}\\s+|,?\\s*${side}$`, "i"), "");
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}
+
+function nudge(event, slider, step, lower, upper, change) {
+  const steps = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10,
+    PageDown: -10 }[event.key];
+  if (!steps) return;
+  event.preventDefault();
+  event.stopPropagation();
+  const shown = Math.round(Number(slider.value) / step) * step + steps * step;
+  change(Math.min(Math.max(shown, lower), upper));
+}
+
+function show() {
+  const values = get("values");
+  const baseline = get("baseline");
+  const estimates = new Map((get("fit")?.parameters ?? []).map((p) => [p.name, p]));
+  let changed = 0;
+  for (const [name, parts] of rows) {
+    const { parameter, slider, field, lower, upper } = parts;
+    const factor = parameter.display_factor;
+    const shown = values[name] * factor;
+    const start = valueAt(baseline, name) * factor;
+    const at = (x) => {
+      const share = Math.min(Math.max((x - lower) / (upper - lower), 0), 1);
+      return `calc(${THUMB / 2}px + ${share} * (100% - ${THUMB}px))`;
+    };
+    slider.value = shown;
+    slider.setAttribute("aria-valuetext", `${units.number(shown)} ${parameter.display_unit}`);
+    if (document.activeElement !== field) field.value = units.plain(shown);
+    const moved = Math.abs(shown - start) > 1e-9 * Math.max(1, Math.abs(start));
+    changed += moved;
+    parts.element.classList.toggle("moved", moved);
+    parts.element.classList.toggle("outside", shown < lower || shown > upper);
+    parts.reset.title = `Back to the baseline, ${units.number(start)} ${parameter.display_unit}`;
+    parts.reset.disabled = !moved;
+    parts.baseline.style.left = at(start);
+    band(parts, estimates.get(name), factor, at);
+  }
+  $("#reset-all").disabled = changed === 0;
+  $("#set-baseline").disabled = changed === 0;
+}
+
+function band(parts, estimate, factor, at) {
+  const { interval, spread, parameter } = parts;
+  const known = Boolean(estimate?.confidence_interval);
+  interval.hidden = !known;
+  if (!known) {
+    spread.textContent = "";
+    spread.title = "";
+    return;
+  }
+  const [low, high] = estimate.confidence_interval.map((x) => x * factor);
+  interval.style.left = at(low);
+  interval.style.right = `calc(100% - ${at(high).slice(4)}`;
+  interval.className = `interval ${estimate.determined}`;
+  const half = (high - low) / 2;
+  const value = estimate.value * factor;
+  spread.textContent = half > Math.abs(value) ? "± over 100 %" : `± ${units.number(half, 2)}`;
+  spread.className = `spread ${estimate.determined}`;
+  spread.title =
+    `Identified ${units.number(value)} ${parameter.display_unit}, 95 % interval ` +
+    `${units.number(low)} to ${units.number(high)}; ${DETERMINED[estimate.determined]}`;
+}

@@ -1,0 +1,65 @@
+// Small helpers around the document.
+
+export const $ = (selector, root = document) => root.querySelector(selector);
+
+/** An element: properties, `dataset`, `on` listeners and attributes with a dash; then children. */
+export function h(tag, props = {}, ...children) {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(props)) {
+    if (value === undefined || value === null) continue;
+    if (name === "dataset") Object.assign(element.dataset, value);
+    else if (name === "on") {
+      for (const [event, listener] of Object.entries(value)) {
+        element.addEventListener(event, listener);
+      }
+    } else if (name in element && !name.includes("-")) element[name] = value;
+    else element.setAttribute(name, value);
+  }
+  element.append(...children.flat().filter((child) => child !== null && child !== undefined));
+  return element;
+}
+
+/** A parameter's symbol such as `K_F` or `phi_R`, with its index set low. */
+export function symbol(text) {
+  const [base, index] = text.split("_");
+  const greek = base === "phi" ? "φ" : base;
+  return h("span", { className: "symbol" }, greek, index ? h("sub", {}, index) : null);
+}
+
+/** Tabs by the ARIA pattern: arrows move, one panel shows. Returns `select(id)`. */
+export function tabs(list, onSelect = () => {}) {
+  const buttons = [...list.querySelectorAll('[role="tab"]')];
+  const panelOf = (button) => document.getElementById(button.getAttribute("aria-controls"));
+  const select = (id, focus = false) => {
+    for (const button of buttons) {
+      const chosen = button.id === id;
+      button.setAttribute("aria-selected", chosen);
+      button.tabIndex = chosen ? 0 : -1;
+      const panel = panelOf(button);
+      if (panel && panel.getAttribute("role") === "tabpanel") panel.hidden = !chosen;
+      if (chosen && focus) button.focus();
+    }
+    onSelect(id);
+  };
+  for (const [i, button] of buttons.entries()) {
+    button.addEventListener("click", () => select(button.id));
+    button.addEventListener("keydown", (event) => {
+      const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+      if (!step) return;
+      event.preventDefault();
+      event.stopPropagation();
+      select(buttons[(i + step + buttons.length) % buttons.length].id, true);
+    });
+  }
+  if (buttons.length) select(buttons[0].id);
+  return select;
+}
+
+/** `fn` after the calls have paused for `wait` ms. */
+export function debounced(fn, wait) {
+  let timer = 0;
+  return (...args) => {
+    clearTimeout(timer);
+    timer = setTimeout(() => fn(...args), wait);
+  };
+}

@@ -1,0 +1,216 @@
+// The page: reads the session, builds the parts and keeps them together.
+//
+// Flow: a control changes the store -> simulation.js asks the service -> runs come into the store
+// -> charts, 3D and numbers draw them. Nothing else talks to the service but api.js.
+//
+// For the browser tests `window.ridetune` looks inside: state(key) of the store, timing (ms from a
+// slider's move to new charts), scene (connected, built, poses, last messages), drawn() (what each
+// chart shows), zoomed(), clock and job().
+
+import * as api from "./api.js";
+import * as car from "./car.js";
+import * as charts from "./charts.js";
+import * as comfort from "./comfort.js";
+import * as controls from "./controls.js";
+import { $, debounced, tabs } from "./dom.js";
+import * as identification from "./identification.js";
+import * as measurements from "./measurements.js";
+import { banner, notice, refused } from "./notices.js";
+import * as ride from "./ride.js";
+import * as scene from "./scene.js";
+import { timing, want } from "./simulation.js";
+import { get, on, set } from "./store.js";
+import * as timeline from "./timeline.js";
+import * as units from "./units.js";
+
+const RETRY = 1500;
+const SAVE_AFTER = 800;
+
+const sid = location.pathname.split("/")[2];
+let unsaved = false;
+
+async function start() {
+  api.useSession(sid);
+  set({ session: sid, online: true, ready: false, compare: "baseline", road: null, fit: null,
+    now: null, reference: null, measured: null, traction: "exact" });
+  const [session, parameters, channels, vehicles, manoeuvres, roads] = await Promise.all([
+    api.session(), api.parameters(), api.channels(), api.vehicles(), api.manoeuvres(), api.roads(),
+  ]);
+  units.learn(channels, parameters);
+  const { vehicle, measurements: rows } = session;
+  const baseline = session.baseline ?? vehicle;
+  set({ parameters, vehicles, manoeuvres, roads, vehicle, baseline, measurements: rows });
+  const usable = rows.find((row) => row.usable_for_identification);
+  set({
+    values: controls.valuesOf(vehicle),
+    ride: usable ? { kind: "measurement", id: usable.id }
+      : { kind: "manoeuvre", key: manoeuvres[0].key },
+  });
+  build();
+  follow();
+  await settle();
+  await identification.resume(session.identifications);
+}
+
+function build() {
+  const select = tabs($("#workbench [role=tablist]"));
+  timeline.build();
+  timeline.listenToKeys();
+  controls.build({ onBaseline: setBaseline });
+  ride.build();
+  charts.build(() => want("now", "reference"));
+  comfort.build();
+  measurements.build(() => select("tab-measurements"));
+  identification.build({
+    open: () => select("tab-identification"), apply: applyFit, saved: save,
+  });
+  car.build();
+  scene.build(sid, { askForCar: () => want("scene") });
+  splitter();
+  help();
+}
+
+/** What follows from a change. */
+function follow() {
+  on("values", () => {
+    unsaved = true;
+    saveSoon();
+    want("now", ...(get("compare") === "7dof" ? ["reference"] : []));
+  });
+  on("baseline compare", () => want("reference"));
+  on("vehicle", () => want("now", "scene", "reference"));
+  on("ride road", () => {
+    set({ now: null, reference: null, measured: null });
+    want("measured", "now", "reference");
+  });
+  on("ride", () => charts.showAll());
+  on("now measured", (state) => {
+    const run = state.now ?? state.measured;
+    if (run) timeline.setRange(run.time[0], run.time[run.time.length - 1]);
+  });
+  on("now trouble ready online", status);
+  on("ready online", (state) => {
+    if (!state.online || !state.ready) settle();
+  });
+}
+
+/** Wait until the service answers and has compiled, then ask for everything. */
+let settling = null;
+function settle() {
+  settling ??= (async () => {
+    for (;;) {
+      const state = await api.readiness().catch(() => null);
+      if (state?.state === "ready") break;
+      set({ online: state !== null });
+      banner(
+        state
+          ? `${state.message || "The service is compiling the car model for this machine."} ` +
+            "This happens at the first start only; the page goes on by itself."
+          : "The service does not answer. Your car and files are kept; the page goes on as soon " +
+            "as it is back.",
+        state ? "calm" : "lost");
+      await new Promise((done) => setTimeout(done, RETRY));
+    }
+    banner("");
+  })();
+  return settling.then(() => {
+    if (!settling) return;
+    settling = null;
+    set({ online: true, ready: true });
+    if (unsaved) saveSoon();
+    want("measured", "now", "reference", ...(get("now") ? ["scene"] : []));
+  });
+}
+
+async function save() {
+  if (!unsaved) return;
+  unsaved = false;
+  try {
+    await api.saveVehicle(controls.withValues(get("vehicle"), get("values")));
+  } catch (error) {
+    unsaved = true;
+    if (error.lost) set({ online: false });
+  }
+}
+const saveSoon = debounced(save, SAVE_AFTER);
+
+async function setBaseline() {
+  const vehicle = controls.withValues(get("vehicle"), get("values"));
+  try {
+    await api.saveBaseline(vehicle);
+    set({ baseline: vehicle });
+    notice("info", "Baseline set", "The sliders' values are what changes are now compared with.");
+  } catch (error) {
+    if (error.lost) set({ online: false });
+    refused(error, "Setting the baseline");
+  }
+}
+
+function applyFit(result) {
+  set({ values: { ...get("values"),
+    ...Object.fromEntries(result.parameters.map(({ name, value }) => [name, value])) } });
+  notice("info", "The sliders hold the identified car",
+    "“Set baseline” makes it the car that later changes are compared with.");
+}
+
+function status() {
+  const run = get("now");
+  $("#status").textContent = !get("online") ? "no connection"
+    : !get("ready") ? "compiling"
+    : get("trouble") ? "not simulated"
+    : run ? `simulated in ${units.number(1000 * (run.head.seconds ?? 0), 2)} ms` : "simulating …";
+}
+
+/** The bar between 3D view and workbench: drag it, or arrows. */
+function splitter() {
+  const bar = $("#splitter");
+  const put = (share) => {
+    const bounded = Math.min(Math.max(share, 20), 80);
+    document.documentElement.style.setProperty("--stage", `${bounded}fr`);
+    document.documentElement.style.setProperty("--bench", `${100 - bounded}fr`);
+    bar.setAttribute("aria-valuenow", Math.round(bounded));
+  };
+  bar.addEventListener("pointerdown", (event) => {
+    bar.setPointerCapture(event.pointerId);
+    document.body.classList.add("dragging");
+  });
+  bar.addEventListener("pointermove", (event) => {
+    if (!bar.hasPointerCapture(event.pointerId)) return;
+    const box = $("main").getBoundingClientRect();
+    put((100 * (event.clientY - box.top)) / box.height);
+  });
+  bar.addEventListener("pointerup", () => document.body.classList.remove("dragging"));
+  bar.addEventListener("keydown", (event) => {
+    const step = { ArrowUp: -4, ArrowDown: 4 }[event.key];
+    if (!step) return;
+    event.preventDefault();
+    put(Number(bar.getAttribute("aria-valuenow")) + step);
+  });
+  put(54);
+}
+
+function help() {
+  const dialog = $("#help-dialog");
+  $("#help").addEventListener("click", () => dialog.showModal());
+  $("#help-close").addEventListener("click", () => dialog.close());
+}
+
+/** Without its session the page is nothing: say so, and where to go. */
+function lost(error) {
+  if (error.lost) {
+    banner("The service does not answer; trying again.", "lost");
+    setTimeout(() => location.reload(), 2 * RETRY);
+    return;
+  }
+  if (!(error instanceof api.Refusal)) throw error;
+  banner(`${error.message} `, "lost");
+  $("#banner").append(Object.assign(document.createElement("a"),
+    { href: "/", textContent: "Begin a new session" }));
+}
+
+window.ridetune = {
+  state: get, timing, scene: scene.seen, drawn: charts.drawn, zoomed: charts.zoomed,
+  clock: timeline.clock, job: identification.current,
+};
+
+start().catch(lost);

@@ -1,0 +1,198 @@
+// Measured rides: add by button or by dropping files, look at them, delete them.
+
+import * as api from "./api.js";
+import { $, h } from "./dom.js";
+import { notice } from "./notices.js";
+import { choose } from "./ride.js";
+import { get, on, set } from "./store.js";
+import * as units from "./units.js";
+
+const PREVIEW_SAMPLES = 1500;
+const TINTS = ["#e69f00", "#56b4e9", "#cc79a7", "#c9ced6"];
+
+let selected = null;
+let failures = [];
+let plot = null;
+let openTab = () => {};
+const parts = {};
+
+export function build(open) {
+  openTab = open;
+  parts.list = h("div", { className: "measurement-list scrolls" });
+  parts.detail = h("div", { className: "measurement-detail scrolls" });
+  parts.file = h("input", {
+    type: "file", id: "file", multiple: true, accept: ".csv,.txt,text/csv", className: "hidden-file",
+    "aria-label": "Measurement files",
+    on: { change: () => { add([...parts.file.files]); parts.file.value = ""; } },
+  });
+  $("#measurements").append(h("div", { className: "measurements" }, parts.list, parts.detail));
+  const drop = $("#drop");
+  let depth = 0;
+  const carriesFiles = (event) => event.dataTransfer?.types.includes("Files");
+  const over = (change) => (event) => {
+    if (!carriesFiles(event)) return;
+    event.preventDefault();
+    depth = Math.max(0, depth + change);
+    drop.hidden = depth === 0;
+  };
+  document.addEventListener("dragenter", over(1));
+  document.addEventListener("dragleave", over(-1));
+  document.addEventListener("dragover", over(0));
+  document.addEventListener("drop", (event) => {
+    if (!carriesFiles(event)) return;
+    event.preventDefault();
+    depth = 0;
+    drop.hidden = true;
+    openTab();
+    add([...event.dataTransfer.files]);
+  });
+  on("measurements", show);
+  show();
+}
+
+async function add(files) {
+  failures = [];
+  for (const file of files) {
+    parts.busy = file.name;
+    show();
+    try {
+      const row = await api.upload(file);
+      set({ measurements: [...get("measurements"), row] });
+      selected = row.id;
+      notice("info", `${row.name} is in`, row.usable_for_identification
+        ? `${units.number(row.duration, 3)} s, ready for identification.`
+        : `It lacks ${row.missing.join(", ")} for identification.`);
+    } catch (error) {
+      failures.push({ name: file.name, error });
+      if (error.lost) set({ online: false });
+    }
+  }
+  parts.busy = null;
+  show();
+}
+
+function show() {
+  const rows = get("measurements");
+  if (!rows.some(({ id }) => id === selected)) selected = rows[0]?.id ?? null;
+  parts.list.replaceChildren(
+    h("div", { className: "row-tools" },
+      h("button", { type: "button", id: "upload", on: { click: () => parts.file.click() } },
+        "Add files …"),
+      parts.file,
+      h("span", { className: "hint" }, parts.busy ? `Reading ${parts.busy} …` : "or drop them here")),
+    ...failures.map(({ name, error }) =>
+      h("div", { className: "problem", role: "alert" },
+        h("strong", {}, `${name} was not taken`), h("p", {}, error.message))),
+    ...(rows.length ? [table(rows)] : [h("p", { className: "empty" },
+      "No measurement yet. Add a CSV file whose header names channels and units, such as " +
+      "“time [s],chassis.z [mm],wheel.fl.z [mm]”.")]),
+  );
+  detail(rows.find(({ id }) => id === selected));
+}
+
+function table(rows) {
+  return h("table", { className: "pick" },
+    h("thead", {}, h("tr", {}, ["Name", "Duration", "Sampling", "Channels", ""].map((text) =>
+      h("th", { scope: "col" }, text)))),
+    h("tbody", {}, rows.map((row) =>
+      h("tr", { className: row.id === selected ? "selected" : "" },
+        h("th", { scope: "row" }, h("button", {
+          type: "button", className: "link", "aria-pressed": row.id === selected,
+          on: { click: () => { selected = row.id; show(); } },
+        }, row.name)),
+        h("td", {}, `${units.number(row.duration, 3)} s`),
+        h("td", {}, `${units.number(1000 * row.sample_step, 3)} ms`),
+        h("td", {}, row.channels.filter(({ name }) => name !== "time").length),
+        h("td", {}, badges(row))))));
+}
+
+function badges(row) {
+  const out = [];
+  if (row.warnings.length) {
+    out.push(h("span", { className: "badge warn", title: row.warnings.join("\n") },
+      `${row.warnings.length} warning${row.warnings.length > 1 ? "s" : ""}`));
+  }
+  if (!row.usable_for_identification) {
+    out.push(h("span", { className: "badge", title: `It lacks ${row.missing.join(", ")}.` },
+      "not for fitting"));
+  }
+  return out;
+}
+
+async function detail(row) {
+  plot?.destroy();
+  plot = null;
+  if (!row) {
+    parts.detail.replaceChildren();
+    return;
+  }
+  const names = row.channels.map(({ name }) => name).filter((name) => name !== "time");
+  const choice = h("select", { "aria-label": "Channel to look at" },
+    names.map((name) => h("option", { value: name }, capital(units.channel(name).label))));
+  const drawing = h("div", { className: "preview" });
+  const facts = h("p", { className: "hint" });
+  choice.addEventListener("change", () => preview(row, choice.value, drawing, facts));
+  parts.detail.replaceChildren(
+    h("div", { className: "row-tools" },
+      h("strong", { className: "grow" }, row.name),
+      row.usable_for_identification
+        ? h("button", { type: "button", on: { click: () => choose(`measurement ${row.id}`) } },
+            "Drive it")
+        : null,
+      h("a", { className: "button", href: api.originalUrl(row.id), download: row.name }, "Download"),
+      h("button", { type: "button", className: "danger", on: { click: (event) => remove(row, event) } },
+        "Delete")),
+    h("div", { className: "row-tools" }, choice, facts),
+    drawing,
+    ...(row.warnings.length
+      ? [h("ul", { className: "warnings" }, row.warnings.map((text) => h("li", {}, text)))] : []),
+    ...(row.usable_for_identification ? [] : [h("p", { className: "hint" },
+      `It lacks ${row.missing.join(", ")}; identification needs them.`)]),
+  );
+  if (names.length) await preview(row, choice.value, drawing, facts);
+}
+
+async function preview(row, name, drawing, facts) {
+  const { display_factor: factor, display_unit: unit } = units.channel(name);
+  const stated = row.channels.find((channel) => channel.name === name);
+  facts.textContent = `${units.number(stated.minimum * factor, 3)} to ` +
+    `${units.number(stated.maximum * factor, 3)} ${unit}`;
+  let run;
+  try {
+    run = await api.measurement(row.id, [name], PREVIEW_SAMPLES, "extremes");
+  } catch (error) {
+    facts.textContent = error.message;
+    return;
+  }
+  if (row.id !== selected || !drawing.isConnected) return;
+  plot?.destroy();
+  const axis = { stroke: "#93a0ae", font: "11px system-ui, sans-serif",
+    grid: { stroke: "#2a323c", width: 1 }, ticks: { stroke: "#2a323c", width: 1, size: 4 } };
+  plot = new window.uPlot({
+    width: Math.max(drawing.clientWidth, 200), height: 132, legend: { show: false },
+    scales: { x: { time: false } }, cursor: { show: false }, padding: [6, 10, 0, 0],
+    axes: [{ ...axis, size: 26, gap: 3 }, { ...axis, size: 46, gap: 4 }],
+    series: [{}, { stroke: TINTS[0], width: 1.2, points: { show: false } }],
+  }, [Array.from(run.time), Array.from(run.values[name], (v) =>
+    (Number.isFinite(v) ? v * factor : null))], drawing);
+}
+
+/** Deleting asks once, in place. */
+async function remove(row, event) {
+  const button = event.currentTarget;
+  if (button.dataset.sure !== "yes") {
+    button.dataset.sure = "yes";
+    button.textContent = "Really delete?";
+    button.addEventListener("blur", () => { button.dataset.sure = ""; button.textContent = "Delete"; });
+    return;
+  }
+  try {
+    await api.deleteMeasurement(row.id);
+    set({ measurements: get("measurements").filter(({ id }) => id !== row.id) });
+  } catch (error) {
+    if (error.lost) set({ online: false });
+    else notice("error", `${row.name} stays`, error.message);
+  }
+}
+
+const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);

@@ -1,0 +1,148 @@
+// Where every part of the car is at one instant: pure arithmetic, no document, no server.
+//
+// Frame: X forward with its origin under the CG at rest (it travels with the car), Y left, Z up,
+// Z = 0 the flat ground. Body frame B and signs as in app/frames (ISO 8855). Nodes and bones are
+// those of app/scene.py. Motion is magnified about the state of rest: z, pitch, roll, arm angles,
+// wheel heights and the road alike.
+
+const INBOARD = 0.19;
+const BAR_SHARE = 0.25;
+export const CORNERS = ["fl", "fr", "rl", "rr"];
+/** Channels that a pose is made of. */
+export const POSE_CHANNELS = [
+  "chassis.x", "chassis.z", "chassis.pitch", "chassis.roll",
+  ...CORNERS.flatMap((c) => [`arm.${c}.angle`, `wheel.${c}.z`, `road.${c}.z`]),
+];
+
+/** Index and weight of an instant between samples: value = (1 - w) v[i] + w v[i + 1]. */
+export function locate(time, t) {
+  const last = time.length - 1;
+  if (last < 1 || t <= time[0]) return [0, 0];
+  if (t >= time[last]) return [last - 1, 1];
+  let low = 0;
+  let high = last;
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (time[middle] <= t) low = middle;
+    else high = middle;
+  }
+  return [low, (t - time[low]) / (time[high] - time[low])];
+}
+
+/** A channel's value at a located instant; NaN where the run does not have it. */
+export function valueAt(run, name, [i, w]) {
+  const values = run.values[name];
+  if (!values) return NaN;
+  return w ? (1 - w) * values[i] + w * values[i + 1] : values[i];
+}
+
+const or0 = (x) => (Number.isFinite(x) ? x : 0);
+
+/** Geometry of a corner at rest, in B. */
+function corner(vehicle, name) {
+  const front = name[0] === "f";
+  const axle = front ? vehicle.front : vehicle.rear;
+  const forward = front ? 1 : -1;
+  const side = name[1] === "l" ? 1 : -1;
+  const cgHeight = vehicle.chassis.cg_height;
+  const x = forward * axle.cg_distance;
+  const { distance, angle } = axle.pivot;
+  return {
+    side, radius: axle.wheel.radius,
+    hub: [x, (side * axle.track) / 2, axle.wheel.radius - cgHeight],
+    pivot: [x - forward * distance, (side * axle.track) / 2, distance * Math.tan(angle) - cgHeight],
+    mountHeight: axle.suspension.mount_height ?? 0.4,
+  };
+}
+
+/** The body's pose at an instant: position, quaternion (w x y z) and a map from B to the frame. */
+export function bodyPose(vehicle, run, where, magnification) {
+  const z = vehicle.chassis.cg_height + magnification * or0(valueAt(run, "chassis.z", where));
+  const pitch = magnification * or0(valueAt(run, "chassis.pitch", where));
+  const roll = magnification * or0(valueAt(run, "chassis.roll", where));
+  const [cp, sp, cr, sr] = [Math.cos(pitch), Math.sin(pitch), Math.cos(roll), Math.sin(roll)];
+  return {
+    position: [0, 0, z],
+    wxyz: product(aboutY(pitch), [Math.cos(roll / 2), Math.sin(roll / 2), 0, 0]),
+    place: ([x, y, up]) => {
+      const across = cr * y - sr * up;
+      const above = sr * y + cr * up;
+      return [cp * x + sp * above, across, z - sp * x + cp * above];
+    },
+  };
+}
+
+/** viser messages that put the car's parts in place. */
+export function carMessages(vehicle, run, t, magnification) {
+  const where = locate(run.time, t);
+  const travelled = or0(valueAt(run, "chassis.x", where));
+  const body = bodyPose(vehicle, run, where, magnification);
+  const messages = [...pose("/car/body", body.position, body.wxyz)];
+  const onBar = {};
+  for (const name of CORNERS) {
+    const { side, radius, hub, pivot, mountHeight } = corner(vehicle, name);
+    const angle = magnification * or0(valueAt(run, `arm.${name}.angle`, where));
+    const height = valueAt(run, `wheel.${name}.z`, where);
+    const [c, s] = [Math.cos(angle), Math.sin(angle)];
+    const [dx, dz] = [hub[0] - pivot[0], hub[2] - pivot[2]];
+    const centre = body.place([pivot[0] + c * dx + s * dz, hub[1], pivot[2] - s * dx + c * dz]);
+    // Exact at any magnification: large rotations would lift a wheel off its magnified road.
+    if (Number.isFinite(height)) centre[2] = radius + magnification * height;
+    const inboard = (point) => [point[0], point[1] - side * INBOARD, point[2]];
+    const inner = inboard(centre);
+    const hinge = inboard(body.place(pivot));
+    const mount = inboard(body.place([hub[0], hub[1], hub[2] + mountHeight]));
+    const turn = product(body.wxyz, aboutY(angle + travelled / radius));
+    messages.push(
+      ...pose(`/car/wheel_${name}`, centre, turn),
+      ...bones(`/car/arm_${name}`, inner, hinge),
+      ...bones(`/car/spring_${name}`, inner, mount),
+      ...bones(`/car/damper_${name}`, inner, mount),
+    );
+    onBar[name] = inner.map((value, k) => value + BAR_SHARE * (hinge[k] - value));
+  }
+  messages.push(
+    ...bones("/car/bar_front", onBar.fl, onBar.fr),
+    ...bones("/car/bar_rear", onBar.rl, onBar.rr),
+    position("/road/surface", [-travelled, 0, 0]),
+    position("/road/lines", [-travelled, 0, 0.004]),
+  );
+  return messages;
+}
+
+/** viser messages for the outline of another run of the same instant. */
+export function ghostMessages(vehicle, run, t, magnification) {
+  const where = locate(run.time, t);
+  const body = bodyPose(vehicle, run, where, magnification);
+  const messages = pose("/ghost/body", body.position, body.wxyz);
+  for (const name of CORNERS) {
+    const { hub, radius } = corner(vehicle, name);
+    const height = or0(valueAt(run, `wheel.${name}.z`, where));
+    messages.push(
+      position(`/ghost/wheel_${name}`, [hub[0], hub[1], radius + magnification * height]),
+    );
+  }
+  return messages;
+}
+
+export const visibility = (name, visible) =>
+  ({ type: "SetSceneNodeVisibilityMessage", name, visible, owner: "" });
+export const update = (name, updates) =>
+  ({ type: "SceneNodeUpdateMessage", name, updates, owner: "" });
+const position = (name, at) => ({ type: "SetPositionMessage", name, position: at, owner: "" });
+const pose = (name, at, wxyz) =>
+  [position(name, at), { type: "SetOrientationMessage", name, wxyz, owner: "" }];
+const bones = (name, start, end) =>
+  [start, end].map((at, bone_index) =>
+    ({ type: "SetBonePositionMessage", name, bone_index, position: at, owner: "" }));
+
+const aboutY = (angle) => [Math.cos(angle / 2), 0, Math.sin(angle / 2), 0];
+
+function product([a, b, c, d], [e, f, g, k]) {
+  return [
+    a * e - b * f - c * g - d * k,
+    a * f + b * e + c * k - d * g,
+    a * g - b * k + c * e + d * f,
+    a * k + b * g - c * f + d * e,
+  ];
+}

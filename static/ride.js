@@ -1,0 +1,76 @@
+// Which ride is simulated: a measured one (the rims' motion prescribed) or a manoeuvre on a road.
+
+import { $, h } from "./dom.js";
+import { get, on, set } from "./store.js";
+
+/** Fill the choices of the header and follow them. */
+export function build() {
+  $("#ride").addEventListener("change", () => choose($("#ride").value));
+  $("#road").addEventListener("change", () => {
+    const { value } = $("#road");
+    set({ road: value ? JSON.parse(value) : null });
+  });
+  $("#compare").addEventListener("change", () => set({ compare: $("#compare").value }));
+  $("#road").append(
+    h("option", { value: "" }, "as the manoeuvre says"),
+    ...roadChoices(get("roads")).map(([text, road]) =>
+      h("option", { value: JSON.stringify(road) }, text)),
+  );
+  on("measurements manoeuvres", list);
+  on("ride", show);
+  list();
+  show();
+}
+
+/** Roads to choose from, of what the service can build. */
+function roadChoices(roads) {
+  const classes = (roads?.classes ?? []).map((name) => [
+    `ISO 8608 class ${name}`,
+    { sections: [[name, 0]] },
+  ]);
+  return classes;
+}
+
+/** Choose by key: "measurement ID" or "manoeuvre KEY". */
+export function choose(key) {
+  const [kind, id] = split(key);
+  set({ ride: kind === "measurement" ? { kind, id } : { kind, key: id }, road: null });
+}
+
+const split = (key) => [key.slice(0, key.indexOf(" ")), key.slice(key.indexOf(" ") + 1)];
+const keyOf = (ride) => `${ride.kind} ${ride.id ?? ride.key}`;
+
+function list() {
+  const usable = get("measurements").filter((m) => m.usable_for_identification);
+  const roads = get("manoeuvres").filter((m) => m.kind !== "posts");
+  const posts = get("manoeuvres").filter((m) => m.kind === "posts");
+  $("#ride").replaceChildren(...[
+    group("Measured: the car follows the recorded rims", usable.map((m) =>
+      [`measurement ${m.id}`, m.name, ""])),
+    group("Manoeuvres on a road", roads.map((m) =>
+      [`manoeuvre ${m.key}`, m.name, m.description])),
+    group("Four-post rig", posts.map((m) => [`manoeuvre ${m.key}`, m.name, m.description])),
+  ].filter(Boolean));
+  const ride = get("ride");
+  if (ride?.kind === "measurement" && !usable.some(({ id }) => id === ride.id)) {
+    choose(usable.length ? `measurement ${usable[0].id}` : `manoeuvre ${roads[0].key}`);
+  }
+  show();
+}
+
+function group(label, rows) {
+  if (!rows.length) return null;
+  return h("optgroup", { label }, rows.map(([value, text, title]) =>
+    h("option", { value, title }, text)));
+}
+
+function show() {
+  const ride = get("ride");
+  if (!ride) return;
+  $("#ride").value = keyOf(ride);
+  const manoeuvre = get("manoeuvres").find(({ key }) => key === ride.key);
+  const onRoad = ride.kind === "manoeuvre" && manoeuvre?.kind !== "posts";
+  $("#road-field").hidden = !onRoad;
+  $("#road").value = get("road") ? JSON.stringify(get("road")) : "";
+  $("#ride").title = manoeuvre?.description ?? "";
+}

@@ -1,0 +1,137 @@
+// The 3D view: viser in a frame of our own origin, posed through its bridge (bridge.js).
+
+import { $, h } from "./dom.js";
+import { carMessages, ghostMessages, update, visibility } from "./poses.js";
+import { surface } from "./road.js";
+import { get, on } from "./store.js";
+import { clock, onTime } from "./timeline.js";
+
+const CAMERAS = {
+  "three-quarter": [[3.7, -4.6, 1.75], [0, 0, 0.45]],
+  side: [[0, -6.4, 0.75], [0, 0, 0.55]],
+  front: [[6.2, -0.01, 0.95], [0, 0, 0.55]],
+  top: [[0, -0.02, 7.2], [0, 0, 0]],
+};
+const GHOSTS = { reference: [86, 180, 233], measured: [226, 230, 236] };
+const PATIENCE = 12000;
+
+let frame = null;
+let parts = new Set();
+let shownRoad = null;
+let shownGhost = null;
+let waiting = 0;
+/** What the browser tests look at. */
+export const seen = { connected: false, built: false, poses: 0, last: [] };
+
+/** Open the view of a session. `askForCar` makes the service send the nodes once more. */
+export function build(sid, { askForCar }) {
+  if (!document.createElement("canvas").getContext("webgl2")) {
+    note("The 3D view needs WebGL 2, which this browser does not offer. " +
+      "Everything else on the page works without it.");
+    return;
+  }
+  window.addEventListener("viewer", ({ detail }) => {
+    clearTimeout(waiting);
+    if (detail.state === "scene") {
+      parts = new Set(detail.names);
+      seen.built = parts.has("/car/body");
+      shownRoad = null;
+      shownGhost = null;
+      if (seen.built) {
+        note("");
+        refresh();
+      } else askForCar();
+    } else {
+      seen.connected = detail.state === "connected";
+      seen.built = false;
+      if (!seen.connected) note("The 3D view has lost its connection and is trying again.");
+    }
+  });
+  const query = new URLSearchParams(location.search).get("fixedDpr");
+  frame = h("iframe", {
+    title: "3D view of the car; drag to turn it",
+    src: `/s/${sid}/viewer/${query ? `?fixedDpr=${encodeURIComponent(query)}` : ""}`,
+  });
+  note("Opening the 3D view …");
+  waiting = setTimeout(
+    () => note("The 3D view takes long to open. If it stays away, reload the page."), PATIENCE);
+  $("#view").prepend(frame);
+  for (const button of document.querySelectorAll("[data-camera]")) {
+    button.addEventListener("click", () => look(button.dataset.camera));
+  }
+  $("#ghost").addEventListener("change", refresh);
+  onTime(place);
+  on("now reference measured ride compare", refresh);
+}
+
+function note(text) {
+  const box = $("#view-note");
+  box.hidden = !text;
+  box.textContent = text;
+}
+
+function inject(messages) {
+  seen.last = messages;
+  seen.poses += 1;
+  return frame?.contentWindow?.bridge?.inject(messages) ?? false;
+}
+
+function look(name) {
+  const [eye, target] = CAMERAS[name];
+  inject([
+    { type: "SetCameraLookAtMessage", look_at: target, initial: false },
+    { type: "SetCameraPositionMessage", position: eye, initial: false },
+  ]);
+}
+
+/** Which run the ghost follows, by the choice in the view. */
+function ghostRun() {
+  const choice = $("#ghost").value;
+  const measured = get("measured");
+  const reference = get("compare") === "none" ? null : get("reference");
+  if (choice === "none") return [null, null];
+  if (choice === "reference" || (choice === "auto" && !measured)) return ["reference", reference];
+  return ["measured", measured];
+}
+
+/** Everything anew: after another run, another ride or rebuilt nodes. */
+function refresh() {
+  if (!seen.built) return;
+  shapeRoad();
+  place();
+}
+
+function place() {
+  const run = get("now") ?? get("measured");
+  if (!seen.built || !run) return;
+  const vehicle = get("vehicleNow") ?? get("vehicle");
+  const messages = carMessages(vehicle, run, clock.time, clock.magnification);
+  const [kind, ghost] = ghostRun();
+  const key = ghost ? kind : null;
+  if (key !== shownGhost) {
+    shownGhost = key;
+    for (const name of parts) {
+      if (!name.startsWith("/ghost/")) continue;
+      messages.push(visibility(name, Boolean(ghost)));
+      if (ghost) messages.push(update(name, { colors: new Uint8Array(GHOSTS[kind]) }));
+    }
+  }
+  if (ghost) messages.push(...ghostMessages(vehicle, ghost, clock.time, clock.magnification));
+  if (shownRoad && shownRoad.magnification !== clock.magnification) {
+    shownRoad.magnification = clock.magnification;
+    const scale = [1, 1, clock.magnification];
+    messages.push(update("/road/surface", { scale }), update("/road/lines", { scale }));
+  }
+  inject(messages);
+}
+
+/** The road is shaped once a ride: the sliders move the car, not the ground. */
+function shapeRoad() {
+  const run = get("measured") ?? get("now");
+  if (!run) return;
+  const key = `${JSON.stringify(get("ride"))} ${JSON.stringify(get("road"))} ${run.head.mode}`;
+  if (shownRoad?.key === key) return;
+  shownRoad = { key, magnification: 0 };
+  const { vertices, faces, marks } = surface(get("vehicle"), run);
+  inject([update("/road/surface", { vertices, faces }), update("/road/lines", { points: marks })]);
+}

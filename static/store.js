@@ -1,0 +1,34 @@
+// What the page knows, in one place. Keys:
+//
+//   session      its id
+//   parameters   rows of /api/parameters
+//   vehicle      the session's vehicle, with the sliders' values in it
+//   baseline     the vehicle that the sliders are compared with
+//   values       {parameter name: SI value}, the sliders
+//   measurements, vehicles, manoeuvres, roads   lists of the service
+//   ride         {kind: "measurement", id} or {kind: "manoeuvre", key}
+//   road         null (as the manoeuvre says) or a road description
+//   compare      "baseline", "7dof" or "none"
+//   now, reference, measured   runs (see api.js) of the ride, or null
+//   fit          the last finished fit (fit.json) or null: the sliders' error bars
+//   ready        the service has compiled its kernels
+//   online       the service answers
+
+const state = {};
+const listeners = [];
+
+export const get = (key) => state[key];
+
+/** Change keys and tell whoever listens to one of them. */
+export function set(changes) {
+  const keys = Object.keys(changes).filter((key) => state[key] !== changes[key]);
+  Object.assign(state, changes);
+  for (const { names, fn } of listeners) {
+    if (keys.some((key) => names.includes(key))) fn(state);
+  }
+}
+
+/** Call `fn(state)` after any of the space-separated keys has changed. */
+export function on(keys, fn) {
+  listeners.push({ names: keys.split(" "), fn });
+}
