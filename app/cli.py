@@ -1,0 +1,177 @@
+"""`ridetune`: every job of the engine as a command, and the service.
+
+A command prints its report on standard output and writes its file with -o. Exit status 0 is
+success; 2 is an input that the caller can mend, told in one line on standard error. The engine is
+imported by the command that runs, so that help is quick.
+"""
+
+import argparse
+import os
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, NoReturn
+
+from ..engine.errors import RideError
+
+BAD_INPUT = 2
+INTERRUPTED = 130  # 128 + SIGINT, as shells report it
+PIPE_CLOSED = 141  # 128 + SIGPIPE
+LARGEST_SEED = 2**53
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    parser = command_line()
+    parser.refuse_unknown(arguments)
+    options = parser.parse_args(arguments)
+    try:
+        options.run(options)
+        sys.stdout.flush()
+    except RideError as error:
+        print("ridetune:", " ".join(str(error).split()), file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except BrokenPipeError:
+        # The interpreter flushes once more at its end; let that go nowhere.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return PIPE_CLOSED
+    return 0
+
+
+def command_line() -> "Parser":
+    """The parser of all commands; `options.run` is the chosen one."""
+    parser = Parser(prog="ridetune", description="Tune the ride of a car from measurements.")
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+    parser.commands = commands.choices
+
+    def add(name: str, run: Any, summary: str) -> "Parser":
+        command = commands.add_parser(name, help=summary, description=summary)
+        command.set_defaults(run=run)
+        return command
+
+    _describe_serve(add("serve", _serve, "Serve the page and the REST interface."))
+    _describe_simulate(add("simulate", _simulate, "Simulate a car on a road, from rims or posts."))
+    _describe_identify(add("identify", _identify, "Identify a car's parameters from recordings."))
+    _describe_campaign(add("campaign", _campaign, "Make the two manoeuvres' measurement files."))
+    return parser
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser that complains in one line and suggests the nearest name."""
+
+    commands: "Mapping[str, Parser]" = {}
+
+    def __init__(self, **settings: Any):
+        super().__init__(allow_abbrev=False, **settings)
+
+    def refuse_unknown(self, arguments: Sequence[str]) -> None:
+        """Refuse a misspelt command or option before anything else is found missing."""
+        for text in arguments:
+            name = text.partition("=")[0]
+            if name.startswith("--") and name not in self._option_string_actions:
+                known = [text for text in self._option_string_actions if text.startswith("--")]
+                self.error(f"there is no option {name} ({_near(name, known)})")
+            if not name.startswith("-") and self.commands:
+                if name not in self.commands:
+                    self.error(f"there is no command {name!r} ({_near(name, self.commands)})")
+                self.commands[name].refuse_unknown(arguments[1:])
+                break
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong in one line and stop."""
+        self.exit(BAD_INPUT, f"{self.prog}: {message}; see {self.prog} --help\n")
+
+
+def _near(name: str, known: Iterable[str]) -> str:
+    near = get_close_matches(name, list(known), n=1)
+    return f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
+
+
+def _describe_serve(command: Parser) -> None:
+    command.add_argument("--host", help="address to listen on, 127.0.0.1 unless told")
+    command.add_argument("--port", type=int, help="port to listen on, 8000 unless told")
+    command.add_argument("--data", metavar="DIR", type=Path, help="where sessions are kept")
+
+
+def _describe_simulate(command: Parser) -> None:
+    _add_vehicle(command)
+    drive = command.add_mutually_exclusive_group(required=True)
+    drive.add_argument("--manoeuvre", metavar="NAME", help="1, 2, another known one, or a file")
+    drive.add_argument("--rims", metavar="RUN", help="recording whose rims and a_x drive the car")
+    drive.add_argument("--posts", metavar="RUN", help="recording of a four-post rig's post.*.z")
+    command.add_argument("--road", metavar="FILE", help="road file in place of the manoeuvre's")
+    command.add_argument("--model", choices=("8dof", "7dof"), default="8dof")
+    command.add_argument("--lift-off", action="store_true", help="no tyre pulls at the road")
+    _add_traction(command)
+    command.add_argument("--seed", metavar="N", type=_seed, help="another random road")
+    command.add_argument("-o", "--output", metavar="FILE", help="the run as CSV")
+
+
+def _describe_identify(command: Parser) -> None:
+    command.add_argument("runs", metavar="RUN", nargs="+", help="recording, CSV")
+    _add_vehicle(command)
+    several = {"nargs": "+", "action": "extend", "default": []}
+    command.add_argument("--free", metavar="NAME", **several, help="identify these alone")
+    command.add_argument("--fixed", metavar="NAME", **several, help="identify all but these")
+    command.add_argument("--bounds", metavar="NAME=LOW:HIGH", **several, help="SI units")
+    command.add_argument("--start", metavar="NAME=VALUE", **several, help="SI units")
+    _add_traction(command)
+    _add_noise(command, "noise of the recordings")
+    command.add_argument("-o", "--output", metavar="FILE", help="the fit as JSON")
+
+
+def _describe_campaign(command: Parser) -> None:
+    command.add_argument("--plant", choices=("detailed", "concept"), default="concept")
+    _add_noise(command, "noise to add")
+    command.add_argument("--seed", metavar="N", type=_seed, default=0, help="of the noise")
+    command.add_argument("-o", "--output", metavar="DIR", required=True, help="folder to fill")
+
+
+def _add_vehicle(command: Parser) -> None:
+    command.add_argument(
+        "--vehicle", metavar="FILE", required=True, help="vehicle or fit file, or a known car"
+    )
+
+
+def _add_traction(command: Parser) -> None:
+    command.add_argument("--traction", choices=("exact", "paper"), help="exact unless told")
+
+
+def _add_noise(command: Parser, what: str) -> None:
+    command.add_argument("--noise", metavar="FILE", help=f"{what}, TOML with a [noise] table")
+
+
+def _seed(text: str) -> int:
+    seed = int(text) if text.isdecimal() else -1
+    if not 0 <= seed <= LARGEST_SEED:
+        raise argparse.ArgumentTypeError(f"{text!r} is no whole number from 0 to {LARGEST_SEED}")
+    return seed
+
+
+def _serve(options: argparse.Namespace) -> None:
+    from .serve import serve
+    from .settings import Settings
+
+    serve(Settings.from_environment(host=options.host, port=options.port, data=options.data))
+
+
+def _simulate(options: argparse.Namespace) -> None:
+    from .commands.simulate import simulate
+
+    simulate(options)
+
+
+def _identify(options: argparse.Namespace) -> None:
+    from .commands.identify import identify
+
+    identify(options)
+
+
+def _campaign(options: argparse.Namespace) -> None:
+    from .commands.campaign import campaign
+
+    campaign(options)

@@ -1,0 +1,63 @@
+"""`ridetune identify`: from recordings to the car's parameters with their error bars."""
+
+import json
+import math
+import sys
+from argparse import Namespace
+
+from ...engine.fit import Fit, Progress
+from ...engine.fit_file import fit_to_json
+from ...engine.identification import identify as fit_to_runs
+from ...engine.measurement import read_run
+from ...engine.problem import Problem
+from .inputs import bounds, find_vehicle, read_noise, starts
+from .output import print_fit_percent, print_table, print_warnings, significant, write_file
+
+
+def identify(options: Namespace) -> None:
+    """Fit the free parameters to all runs at once, print the report, write the fit."""
+    noise = read_noise(options.noise)
+    problem = Problem.build(
+        find_vehicle(options.vehicle),
+        [read_run(path, noise=noise) for path in options.runs],
+        options.free or None,
+        options.fixed or None,
+        bounds=bounds(options.bounds),
+        start=starts(options.start),
+        traction=options.traction or "exact",
+    )
+    watched = sys.stderr.isatty()
+    fit = fit_to_runs(problem, progress=_show if watched else None)
+    if watched:
+        print("\r\033[K", end="", file=sys.stderr)
+    if options.output:
+        write_file(options.output, json.dumps(fit_to_json(fit), indent=2) + "\n")
+    _report(fit)
+
+
+def _show(progress: Progress) -> None:
+    """Keep one line on the terminal up to date."""
+    line = f"{progress.simulations} simulations, cost {progress.cost:.6g}"
+    print(f"\r{line}\033[K", end="", file=sys.stderr, flush=True)
+
+
+def _report(fit: Fit) -> None:
+    rows = [("parameter", "value", "± (95 %)", "unit", "determined")]
+    for estimate in fit.parameters:
+        lower, upper = estimate.confidence_interval
+        half = (upper - lower) / 2.0
+        rows.append(
+            (
+                estimate.name,
+                significant(estimate.value, 5),
+                significant(half, 2) if math.isfinite(half) else "unknown",
+                estimate.unit,
+                estimate.determined,
+            )
+        )
+    print_table(rows, right=(1, 2))
+    print()
+    print_fit_percent(fit.fit_percent)
+    print()
+    print(f"{fit.outcome} {fit.simulations} simulations in {fit.seconds:.1f} s.")
+    print_warnings(fit.warnings)

@@ -1,0 +1,86 @@
+"""What the commands write: files that appear whole or not at all, and aligned tables."""
+
+import contextlib
+import math
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from ...engine.errors import RideError
+
+
+class OutputError(RideError):
+    """A file cannot be written where it was asked for."""
+
+    code = "output"
+
+
+def write_file(path: str | Path, text: str) -> None:
+    """Write a text file in one step: a reader sees the old content or the new, never a part."""
+    path = Path(path)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    stream = path.is_relative_to("/dev") or (path.exists() and not path.is_file())
+    try:
+        if stream:
+            path.write_text(text, encoding="utf-8", newline="")
+            return
+        try:
+            temporary.write_text(text, encoding="utf-8", newline="")
+            temporary.replace(os.path.realpath(path))
+        except BaseException:
+            with contextlib.suppress(OSError):
+                temporary.unlink()
+            raise
+    except OSError as error:
+        raise OutputError(
+            f"{path}: the file cannot be written ({error.strerror}); choose another place with -o."
+        ) from error
+
+
+def make_folder(path: str | Path) -> Path:
+    """The folder, made where it is missing."""
+    path = Path(path)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(
+            f"{path}: the folder cannot be made ({error.strerror}); choose another one with -o."
+        ) from error
+    return path
+
+
+def print_table(rows: Sequence[Sequence[str]], right: Iterable[int] = ()) -> None:
+    """Print rows with aligned columns; those in `right` are flush right."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    sides = [">" if column in set(right) else "<" for column in range(len(widths))]
+    for row in rows:
+        cells = (
+            f"{cell:{side}{width}}" for cell, side, width in zip(row, sides, widths, strict=True)
+        )
+        print("  ".join(cells).rstrip())
+
+
+def print_warnings(warnings: Iterable[str]) -> None:
+    """Print each warning as a line of the report."""
+    for warning in warnings:
+        print("Warning:", warning)
+
+
+def significant(value: float, digits: int) -> str:
+    """A number with as many significant digits, without an exponent where one can read it."""
+    if value == 0.0 or not math.isfinite(value):
+        return f"{value:g}"
+    magnitude = math.floor(math.log10(abs(value)))
+    if not -5 <= magnitude < 9:
+        return f"{value:.{digits - 1}e}"
+    return f"{round(value, digits - 1 - magnitude):.{max(0, digits - 1 - magnitude)}f}"
+
+
+def print_fit_percent(runs: Mapping[str, Mapping[str, float]]) -> None:
+    """Print how much of each measured channel's variation the model follows, run by run."""
+    rows = [["fit percent", *runs]]
+    for name in dict.fromkeys(name for fits in runs.values() for name in fits):
+        rows.append(
+            [name, *(f"{fits[name]:.1f}" if name in fits else "-" for fits in runs.values())]
+        )
+    print_table(rows, right=range(1, len(runs) + 1))

@@ -1,0 +1,65 @@
+"""`ridetune simulate`: one car on a road, driven by recorded rims, or on a four-post rig."""
+
+from argparse import Namespace
+from dataclasses import replace
+
+from ...engine.errors import SimulationError
+from ...engine.measurement import read_run, run_to_csv
+from ...engine.road_file import read_road
+from ...engine.simulation import Simulation, simulate_posts, simulate_rims, simulate_road
+from .inputs import find_manoeuvre, find_vehicle
+from .output import print_fit_percent, print_warnings, write_file
+
+BELONGS_TO = {"road": "--manoeuvre", "seed": "--manoeuvre", "traction": "--rims"}
+"""Options that mean something in one mode only."""
+
+
+def simulate(options: Namespace) -> None:
+    """Simulate in the mode that the options name, print the report, write the run."""
+    mode = next(name for name in ("manoeuvre", "rims", "posts") if getattr(options, name))
+    for option, home in BELONGS_TO.items():
+        if getattr(options, option) is not None and home != f"--{mode}":
+            raise SimulationError(f"--{option} belongs to {home}; it means nothing with --{mode}.")
+    if options.lift_off and mode == "rims":
+        raise SimulationError("--lift-off means nothing with --rims, where tyres play no part.")
+    if not options.output and mode != "rims":
+        raise SimulationError("Nothing says where the run goes; add -o run.csv.")
+    simulation = {"manoeuvre": _road, "rims": _rims, "posts": _posts}[mode](options)
+    if simulation.fit_percent:
+        print_fit_percent({simulation.run.name: simulation.fit_percent})
+    if options.output:
+        write_file(options.output, run_to_csv(simulation.run))
+        print(f"Wrote {options.output}: {simulation.run.time.size} samples.")
+    print_warnings(simulation.warnings)
+
+
+def _road(options: Namespace) -> Simulation:
+    vehicle, manoeuvre = find_vehicle(options.vehicle), find_manoeuvre(options.manoeuvre)
+    if options.seed is not None:
+        manoeuvre = replace(manoeuvre, seed=options.seed)
+    if manoeuvre.kind == "posts":
+        if options.road:
+            raise SimulationError(f"{manoeuvre.name} moves the posts of a rig; leave out --road.")
+        return simulate_posts(vehicle, manoeuvre, model=options.model, lift_off=options.lift_off)
+    road = read_road(options.road) if options.road else None
+    return simulate_road(
+        vehicle, manoeuvre, road=road, model=options.model, lift_off=options.lift_off
+    )
+
+
+def _rims(options: Namespace) -> Simulation:
+    return simulate_rims(
+        find_vehicle(options.vehicle),
+        read_run(options.rims),
+        traction=options.traction or "exact",
+        model=options.model,
+    )
+
+
+def _posts(options: Namespace) -> Simulation:
+    return simulate_posts(
+        find_vehicle(options.vehicle),
+        read_run(options.posts),
+        model=options.model,
+        lift_off=options.lift_off,
+    )

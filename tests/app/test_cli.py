@@ -1,0 +1,306 @@
+"""The command line as a person meets it: what is printed, written and returned."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from ridetune.app.cli import main
+from ridetune.engine.channels import Run
+from ridetune.engine.measurement import read_run, write_run
+from ridetune.engine.vehicle_file import read_vehicle, reference_vehicles
+
+SHORT = {
+    "name": "A short start over a rough road",
+    "kind": "road",
+    "duration": 4,
+    "drive": {"kind": "reach-speed", "speed": 6, "time": 2, "start": 0.5, "ramp": 0.1},
+    "road": {"kind": "iso8608", "sections": [{"class": "C"}]},
+    "seed": 1,
+}
+RECORDED = ["chassis.z", "chassis.pitch", "chassis.roll", "chassis.a_x", "chassis.v_x"]
+RECORDED += [f"wheel.{corner}.z" for corner in ("fl", "fr", "rl", "rr")]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def driven(tmp_path_factory):
+    """The path of a short noise-free run of the paper's car, with every channel."""
+    folder = tmp_path_factory.mktemp("driven")
+    (folder / "short.json").write_text(json.dumps(SHORT))
+    path = folder / "driven.csv"
+    command = ["simulate", "--vehicle", "paper", "--manoeuvre", str(folder / "short.json")]
+    assert main([*command, "-o", str(path)]) == 0
+    return path
+
+
+def refused(capsys, *arguments):
+    """Run a command that must fail on bad input; its one line on standard error."""
+    try:
+        status = main(arguments)
+    except SystemExit as stop:
+        status = stop.code
+    printed = capsys.readouterr()
+    assert status == 2
+    assert printed.err.count("\n") == 1
+    return printed.err.strip()
+
+
+def test_describing_the_commands_imports_no_engine():
+    check = (
+        "import sys; from ridetune.app.cli import command_line; command_line().format_help();"
+        "print({'numpy', 'numba', 'scipy', 'fastapi'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", check], capture_output=True, text=True)
+    assert done.stdout == "set()\n", done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ("identfy run.csv", "did you mean identify?"),
+        ("", "COMMAND"),
+        ("simulate --vehicel paper", "did you mean --vehicle?"),
+        ("simulate --vehicle paper", "--manoeuvre --rims --posts"),
+        ("simulate --vehicle paper --manoeuvre 1", "-o"),
+        ("simulate --vehicle paper --manoeuvre 1 --model 9dof -o r.csv", "'9dof'"),
+        ("simulate --vehicle papper --manoeuvre 1 -o r.csv", "did you mean paper?"),
+        ("simulate --vehicle paper --manoeuvre braek -o r.csv", "did you mean brake?"),
+        ("simulate --vehicle paper --manoeuvre 1 --road none.csv -o r.csv", "none.csv"),
+        ("simulate --vehicle paper --manoeuvre heave --road r.csv -o r.csv", "leave out --road"),
+        ("simulate --vehicle paper --manoeuvre 1 --seed -1 -o r.csv", "'-1'"),
+        ("simulate --vehicle paper --manoeuvre 1 --traction paper -o r.csv", "--rims"),
+        ("simulate --vehicle paper --rims run.csv --lift-off", "--lift-off"),
+        ("simulate --vehicle paper --rims run.csv", "run.csv"),
+        ("simulate --vehicle paper --posts run.csv -o r.csv", "run.csv"),
+        ("identify run.csv --vehicle paper", "run.csv"),
+        ("identify run.csv --vehicle paper --noise n.toml", "n.toml"),
+        ("identify run.csv --vehicle paper --colour", "--colour"),
+        ("campaign --plant detailed -o runs", "--plant concept"),
+        ("campaign --noise n.toml -o runs", "n.toml"),
+    ],
+)
+def test_bad_command_is_refused_in_one_line_that_names_the_place(folder, capsys, arguments, told):
+    assert told in refused(capsys, *arguments.split())
+    assert not list(folder.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("option", "told"),
+    [
+        ("--free front.pivot.angel", "did you mean front.pivot.angle?"),
+        ("--bounds front.pivot.angle=0.1", "LOW:HIGH"),
+        ("--bounds front.pivot.angle=0.5:0.1", "crossed"),
+        ("--bounds front.pivot.angle=a:b", "'a'"),
+        ("--start front.pivot.angle", "NAME=VALUE"),
+        ("--start front.pivot.angle=two", "'two'"),
+        ("--free K_F --fixed K_F", "both as free and as fixed"),
+    ],
+)
+def test_bad_parameter_is_refused(driven, capsys, option, told):
+    error = refused(capsys, "identify", str(driven), "--vehicle", "paper", *option.split())
+    assert told in error
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("noise = 1", "[noise]"),
+        ('description = "wet"', "[noise]"),
+        ("[noise", "TOML"),
+        ('[noise]\n"tyre.fl.load" = 10', "tyre.fl.load"),
+        ('[noise]\n"chassis.zz" = 0.001', "chassis.z"),
+        ('[noise]\n"chassis.z" = -0.001', "chassis.z"),
+    ],
+)
+def test_bad_noise_file_is_refused(folder, capsys, text, told):
+    (folder / "noise.toml").write_text(text)
+    assert told in refused(capsys, "campaign", "--noise", "noise.toml", "-o", "runs")
+
+
+def test_a_place_that_cannot_be_written_is_named(folder, driven, capsys):
+    (folder / "file").write_text("kept")
+    where = str(folder / "file" / "run.csv")
+    command = ["simulate", "--vehicle", "paper", "--rims", str(driven), "-o", where]
+    assert where in refused(capsys, *command)
+    assert (folder / "file").read_text() == "kept"
+    assert "file" in refused(capsys, "campaign", "-o", str(folder / "file"))
+
+
+def test_written_run_reads_back_with_every_recorded_channel(driven):
+    run = read_run(driven)
+    assert set(RECORDED) <= set(run.columns)
+    assert run.duration == pytest.approx(SHORT["duration"])
+    assert [path.name for path in driven.parent.iterdir() if "tmp" in path.name] == []
+
+
+def test_seed_draws_another_road_and_the_same_one_again(folder, driven, capsys):
+    manoeuvre = str(driven.parent / "short.json")
+    for name, seed in (("a.csv", "5"), ("b.csv", "5"), ("c.csv", "6")):
+        command = ["simulate", "--vehicle", "paper", "--manoeuvre", manoeuvre]
+        assert main([*command, "--seed", seed, "-o", name]) == 0
+    first, again, other = ((folder / name).read_bytes() for name in ("a.csv", "b.csv", "c.csv"))
+    assert first == again
+    assert first != other
+
+
+def test_road_file_takes_the_place_of_the_manoeuvres_road(folder, driven):
+    """Oracle: on a level road file nothing rolls."""
+    (folder / "level.csv").write_text("x [m],left [m],right [m]\n-10,0,0\n50,0,0\n100,0,0\n")
+    command = ["simulate", "--vehicle", "paper", "--road", "level.csv", "-o", "run.csv"]
+    assert main([*command, "--manoeuvre", str(driven.parent / "short.json")]) == 0
+    run = read_run(folder / "run.csv")
+    assert_allclose(run["road.fl.z"], 0.0, atol=1e-15)
+    assert_allclose(run["chassis.roll"], 0.0, atol=1e-12)
+
+
+def test_rims_of_a_direct_run_bring_its_body_motion_back(folder, driven, capsys):
+    """Oracle: the run itself; 99 % leaves room for the splines through 5 ms samples."""
+    assert main(["simulate", "--vehicle", "paper", "--rims", str(driven), "-o", "r.csv"]) == 0
+    head, *rows = capsys.readouterr().out.splitlines()
+    assert head.split() == ["fit", "percent", "driven.csv"]
+    printed = dict(row.split() for row in rows if len(row.split()) == 2)
+    assert min(float(printed[name]) for name in RECORDED[:3]) > 99.0
+    assert_allclose(read_run(folder / "r.csv").time, read_run(driven).time)
+
+
+def test_both_tractions_and_both_models_follow_rims(driven, capsys):
+    for option in ("--traction=paper", "--model=7dof"):
+        assert main(["simulate", "--vehicle", "paper", "--rims", str(driven), option]) == 0
+        assert "chassis.z" in capsys.readouterr().out
+
+
+def test_still_posts_leave_the_car_at_rest(folder):
+    time = np.linspace(0.0, 1.0, 101)
+    posts = {f"post.{corner}.z": np.zeros(101) for corner in ("fl", "fr", "rl", "rr")}
+    write_run(Run("posts", time, posts), "posts.csv")
+    assert main(["simulate", "--vehicle", "paper", "--posts", "posts.csv", "-o", "r.csv"]) == 0
+    assert_allclose(read_run("r.csv")["chassis.z"], 0.0, atol=1e-12)
+
+
+def test_a_posts_manoeuvre_runs_on_the_rig(folder):
+    heave = {
+        "name": "Heave",
+        "kind": "posts",
+        "duration": 1,
+        "posts": {
+            "pattern": "heave",
+            "first_frequency": 1,
+            "last_frequency": 2,
+            "amplitude": 0.01,
+            "last_amplitude": 0.01,
+        },
+    }
+    (folder / "heave.json").write_text(json.dumps(heave))
+    command = ["simulate", "--vehicle", "paper", "--manoeuvre", "heave.json", "-o", "r.csv"]
+    assert main(command) == 0
+    assert np.ptp(read_run("r.csv")["post.rr.z"]) > 1e-4
+
+
+def test_identified_car_and_report(folder, driven, capsys):
+    """Oracle: the car that drove; 0.1 % is what the noise-free fit promises."""
+    truth = reference_vehicles()["paper"]
+    command = ["identify", str(driven), "--vehicle", "paper", "-o", "fit.json"]
+    command += ["--free", "front.suspension.stiffness", "rear.suspension.damping"]
+    command += ["--start", "front.suspension.stiffness=30000", "rear.suspension.damping=1500"]
+    command += ["--bounds", "front.suspension.stiffness=10000:50000"]
+    assert main(command) == 0
+    printed = capsys.readouterr()
+    assert printed.err == ""
+    assert "The fit converged" in printed.out
+    row = next(line for line in printed.out.splitlines() if line.startswith("front.suspension"))
+    assert row.split()[-1] == "yes"
+    assert "N/m" in row
+    fit = json.loads((folder / "fit.json").read_text())
+    assert fit["parameters"][0]["upper"] == 50000
+    for path in ("front.suspension.stiffness", "rear.suspension.damping"):
+        assert read_vehicle("fit.json").value(path) == pytest.approx(truth.value(path), rel=1e-3)
+
+    assert main(["simulate", "--vehicle", "fit.json", "--rims", str(driven)]) == 0
+
+
+def test_a_channel_with_the_wrong_sign_ends_in_a_warning_that_names_it(folder, driven, capsys):
+    run = read_run(driven)
+    flipped = {name: run[name] * (-1 if name == "chassis.z" else 1) for name in RECORDED}
+    write_run(Run("flipped", run.time, flipped), "flipped.csv")
+    command = ["identify", "flipped.csv", "--vehicle", "paper", "--free", "K_F", "K_R"]
+    assert main(command) == 0
+    warnings = [line for line in capsys.readouterr().out.splitlines() if "Warning:" in line]
+    assert any("chassis.z" in line for line in warnings)
+
+
+def test_campaign_records_both_manoeuvres_with_the_noise_asked_for(folder, capsys):
+    """Oracle: the standard deviation of 4001 samples scatters by 1.1 %; 5 % is far outside."""
+    noise = {"chassis.z": 5e-4, "chassis.roll": 3.5e-4}
+    stated = "".join(f'"{name}" = {value}\n' for name, value in noise.items())
+    (folder / "noise.toml").write_text(f"[noise]\n{stated}")
+    assert main(["campaign", "-o", "clean"]) == 0
+    assert main(["campaign", "-o", "noisy", "--noise", "noise.toml", "--seed", "3"]) == 0
+    assert main(["campaign", "-o", "again", "--noise", "noise.toml", "--seed", "3"]) == 0
+    for name in ("manoeuvre_1.csv", "manoeuvre_2.csv"):
+        clean, noisy = read_run(folder / "clean" / name), read_run(folder / "noisy" / name)
+        assert clean.columns == RECORDED
+        assert noisy.noise == noise
+        error = {channel: np.std(noisy[channel] - clean[channel]) for channel in RECORDED}
+        assert error["chassis.z"] == pytest.approx(5e-4, rel=0.05)
+        assert error["chassis.roll"] == pytest.approx(3.5e-4, rel=0.05)
+        assert error["chassis.pitch"] == 0.0
+        assert (folder / "noisy" / name).read_bytes() == (folder / "again" / name).read_bytes()
+    assert read_vehicle("noisy/vehicle.json") == reference_vehicles()["paper"]
+
+
+PROGRAM = "import sys; from ridetune.app.cli import main; sys.exit(main())"
+
+
+def test_closed_pipe_ends_quietly(folder):
+    command = [sys.executable, "-c", PROGRAM, "campaign", "-o", "runs"]
+    shell = ["sh", "-c", '{ "$@"; echo $? >status; } 2>errors | true', "sh", *command]
+    subprocess.run(shell, check=True)
+    assert (folder / "errors").read_text() == ""
+    assert (folder / "status").read_text() == "141\n"
+
+
+def test_interrupt_ends_quietly(folder):
+    """The vehicle is a pipe that nobody writes to, so the command waits until interrupted."""
+    os.mkfifo("car.json")
+    command = [sys.executable, "-c", PROGRAM, "identify", "run.csv", "--vehicle", "car.json"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as waiting:
+        with open("car.json", "w"):  # opens when the command does
+            waiting.send_signal(signal.SIGINT)
+            assert waiting.wait(timeout=60) == 130
+        assert waiting.stderr.read() == ""
+
+
+def test_serve_answers_until_interrupted(folder):
+    command = [sys.executable, "-u", "-c", PROGRAM, "serve", "--port", "0", "--data", "data"]
+    environment = {name: value for name, value in os.environ.items() if "RIDETUNE" not in name}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as service:
+        try:
+            address = next(word for word in service.stdout.readline().split() if "http" in word)
+            assert status_of(f"{address}healthz") == 200
+        finally:
+            service.send_signal(signal.SIGINT)
+        assert service.wait(timeout=60) == 130
+
+
+def status_of(address):
+    """HTTP status, once the service listens."""
+    for _ in range(300):
+        try:
+            with urllib.request.urlopen(address, timeout=30) as reply:
+                return reply.status
+        except urllib.error.URLError:
+            time.sleep(0.1)
+    raise TimeoutError(address)
