@@ -1,0 +1,52 @@
+"""The documentation tells the truth: its example runs, its tables are the engine's."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from ridetune.engine.channels import CHANNEL_KINDS
+from ridetune.engine.parameters import PARAMETERS
+from ridetune.engine.vehicle_file import vehicle_from_text
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text()
+CONVENTIONS = (ROOT / "docs" / "conventions.md").read_text()
+PAGES = [ROOT / "README.md", ROOT / "sample_runs" / "README.md", *(ROOT / "docs").glob("*.md")]
+
+
+def test_readme_example_identifies_the_sample_car():
+    (example,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    done = subprocess.run([sys.executable, "-c", example], cwd=ROOT, capture_output=True, text=True)
+    assert done.stderr == ""
+    assert "The fit converged" in done.stdout
+    assert all(parameter.name in done.stdout for parameter in PARAMETERS)
+    assert "chassis.z" in done.stdout.splitlines()[-1]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_links_lead_somewhere(page):
+    for target in re.findall(r"\]\(([^)#]+)", page.read_text()):
+        assert target.startswith("http://127.0.0.1") or (page.parent / target).exists(), target
+
+
+def test_every_channel_is_in_the_table():
+    rows = re.findall(r"^\| `(\S+)` \| (.+?) \|.+\|.+\|$", CONVENTIONS, re.MULTILINE)
+    assert rows == [(info.name, info.unit) for info in CHANNEL_KINDS]
+
+
+def test_every_parameter_is_in_the_table():
+    rows = re.findall(r"^\| (\w+) \| `(\S+)` \| (.+?) \|$", CONVENTIONS, re.MULTILINE)
+    assert rows == [(one.symbol, one.name, one.unit) for one in PARAMETERS]
+
+
+def test_vehicle_example_is_one():
+    """With the front axle standing for the rear, as the text says."""
+    (example,) = re.findall(
+        r'^    (\{"name": "\.\.\.",\n     "chassis".*?\}\})$', CONVENTIONS, re.M | re.S
+    )
+    front = re.search(r'"front": (\{.*?\}),\n     "rear"', example, re.DOTALL)[1]
+    rear = front.replace('"driven": false', '"driven": true')
+    vehicle = vehicle_from_text(example.replace('"rear": {...}', f'"rear": {rear}').encode())
+    assert vehicle.brakes.front_share == 0.65
