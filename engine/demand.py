@@ -52,7 +52,8 @@ class PiecewiseLinear:
         first = np.clip(first, 0, self.time.size - 2)
         begin, end = self.time[first], self.time[first + 1]
         width = np.where(end > begin, end - begin, 1.0)
-        share = np.where(end > begin, np.clip((t - begin) / width, 0.0, 1.0), side == "right")
+        past = (t > end) | ((t == end) & (side == "right"))
+        share = np.where(end > begin, np.clip((t - begin) / width, 0.0, 1.0), past)
         share = share[..., np.newaxis]
         return (1.0 - share) * self.values[first] + share * self.values[first + 1]
 
