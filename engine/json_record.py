@@ -6,6 +6,7 @@ A field whose name ends in an underscore is the key without it (`class_` is "cla
 starts with the source and the dotted path of the field and says what to do.
 """
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass
 from difflib import get_close_matches
@@ -78,7 +79,7 @@ class RecordReader:
         records = {kind: one for one in options if (kind := _kind(one))}
         if records and isinstance(data, Mapping):
             kind = data.get("kind")
-            if kind not in records:
+            if not isinstance(kind, str) or kind not in records:
                 what = "is missing" if kind is None else f"{describe(kind)} is not known"
                 raise self.refuse(_join(path, "kind"), f"{what}; {_hint(kind, list(records))}")
             return self.record(records[kind], data, path)
@@ -129,9 +130,12 @@ def describe(data: Any) -> str:
             return "an object"
         case list() | tuple():
             return "a list"
-        case str():
-            return f'"{data}"' if len(data) <= 40 else f'"{data[:37]}..."'
-    return str(data)
+        case int() if abs(data) > 10**30:
+            return "a huge number"
+        case int() | float():
+            return str(data)
+    text = json.dumps(data, ensure_ascii=False, default=str)
+    return text if len(text) <= 40 else f"{text[:37]}..."
 
 
 def expected(hint: Any, accepted: Range | None = None) -> str:
