@@ -1,0 +1,78 @@
+"""What runs inside a job worker: one task at a time, at the lowest priority, able to stop.
+
+A task is a function of (payload, report, cancelled). It is told to stop through a flag in this
+module, set by the worker's event loop while the task computes; it reports through the scheduler's
+event log, at most ten times a second, and always the whole progress, so nothing depends on the
+order or number of reports.
+"""
+
+import os
+import time
+from collections.abc import Callable, Mapping
+from typing import Any, Literal, TypedDict
+
+from ..engine.errors import Cancelled, RideError
+
+TOPIC = "ridetune-tasks"
+LOWEST_PRIORITY = 19
+REPORT_EVERY = 0.1
+
+State = Literal["done", "failed", "cancelled"]
+Report = Callable[[Mapping[str, Any]], None]
+Task = Callable[[Any, Report, Callable[[], bool]], dict[str, Any]]
+
+_asked_to_stop: set[str] = set()
+
+
+class Ending(TypedDict):
+    """How a task ended: its result, or the error a person can mend."""
+
+    state: State
+    result: dict[str, Any] | None
+    error: dict[str, str] | None
+    progress: dict[str, Any]
+
+
+def run(name: str, task: Task, payload: Any) -> Ending:
+    """Run a task to its end; unknown exceptions go to the scheduler as they are."""
+    from distributed import get_worker
+
+    os.setpriority(os.PRIO_PROCESS, 0, LOWEST_PRIORITY)
+    worker = get_worker()
+    progress: dict[str, Any] = {}
+    reported = 0.0
+
+    def send(**news: Any) -> None:
+        worker.log_event(TOPIC, {"task": name, **news})
+
+    def report(now: Mapping[str, Any]) -> None:
+        nonlocal progress, reported
+        progress = dict(now)
+        if time.monotonic() - reported >= REPORT_EVERY:
+            reported = time.monotonic()
+            send(progress=progress)
+
+    def ending(state: State, result: Any = None, error: Any = None) -> Ending:
+        return {"state": state, "result": result, "error": error, "progress": progress}
+
+    send(address=worker.address, process=os.getpid())
+    try:
+        return ending("done", result=task(payload, report, lambda: name in _asked_to_stop))
+    except Cancelled:
+        return ending("cancelled")
+    except RideError as error:
+        return ending("failed", error={"code": error.code, "detail": str(error)})
+    finally:
+        _asked_to_stop.discard(name)
+
+
+def ask_to_stop(name: str) -> None:
+    """Raise the flag of a task, in the process that runs it."""
+    _asked_to_stop.add(name)
+
+
+def kill(process: int) -> None:
+    """End a worker process at once; its nanny, where this runs, starts another."""
+    import signal
+
+    os.kill(process, signal.SIGKILL)

@@ -1,0 +1,65 @@
+"""Small tasks for the cluster's tests, sent to the workers by value."""
+
+import os
+import time
+
+
+def double(payload, report, cancelled):
+    """Report twice, then give the payload doubled, with the priority and process it ran at."""
+    report({"cost": 1.0})
+    time.sleep(0.15)
+    report({"cost": 0.5})
+    return {
+        "value": 2 * payload,
+        "priority": os.getpriority(os.PRIO_PROCESS, 0),
+        "process": os.getpid(),
+    }
+
+
+def wait(payload, report, cancelled):
+    """Wait to be cancelled, looking every few milliseconds."""
+    from ridetune.engine.errors import Cancelled
+
+    report({"cost": 1.0})
+    until = time.monotonic() + 60
+    while time.monotonic() < until:
+        if cancelled():
+            raise Cancelled("stopped")
+        time.sleep(0.005)
+    return {"value": "never cancelled"}
+
+
+def ignore(payload, report, cancelled):
+    """Compute on, whatever is asked."""
+    report({"cost": 1.0})
+    until = time.monotonic() + 60
+    while time.monotonic() < until:
+        time.sleep(0.01)
+    return {"value": "never killed"}
+
+
+def poison(payload, report, cancelled):
+    """Take the worker down."""
+    os._exit(9)
+
+
+def refuse(payload, report, cancelled):
+    """Find something that the caller can mend."""
+    from ridetune.engine.errors import SimulationDiverged
+
+    raise SimulationDiverged(1.25, "chassis.roll", "soften it.")
+
+
+def crash(payload, report, cancelled):
+    """Fail in a way nobody foresaw."""
+    raise ZeroDivisionError("secret detail")
+
+
+def die_once(payload, report, cancelled):
+    """Take the first worker down, succeed on the second."""
+    from pathlib import Path
+
+    if not Path(payload).exists():
+        Path(payload).touch()
+        os._exit(9)
+    return {"value": "second time"}

@@ -1,0 +1,191 @@
+"""The seam to Dask: results, progress, cancelling, lost workers. One local cluster for all."""
+
+import queue
+import time
+
+import cloudpickle
+import pytest
+from ridetune.app.cluster import Cluster
+from ridetune.app.errors import Unavailable
+from ridetune.app.worker import Ending
+
+from . import tasks
+
+PATIENCE = 60.0
+
+cloudpickle.register_pickle_by_value(tasks)
+
+
+class Heard:
+    """A listener that writes down what it is told."""
+
+    def __init__(self):
+        self.started: queue.Queue[str] = queue.Queue()
+        self.progress: queue.Queue[tuple[str, dict]] = queue.Queue()
+        self.ends: queue.Queue[tuple[str, Ending]] = queue.Queue()
+        self.lost: queue.Queue[str] = queue.Queue()
+
+    def task_started(self, task):
+        self.started.put(task)
+
+    def task_progressed(self, task, progress):
+        self.progress.put((task, dict(progress)))
+
+    def task_ended(self, task, ending):
+        self.ends.put((task, ending))
+
+    def task_lost(self, task):
+        self.lost.put(task)
+
+    def end_of(self, task: str) -> Ending:
+        name, ending = self.ends.get(timeout=PATIENCE)
+        assert name == task
+        return ending
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    cluster = Cluster("", tmp_path_factory.mktemp("dask"), workers=2)
+    yield cluster
+    cluster.close()
+
+
+@pytest.fixture
+def heard() -> Heard:
+    return Heard()
+
+
+def test_a_task_gives_its_result_and_reports_on_the_way(cluster, heard):
+    """At the lowest priority, in another process, with the progress told as it comes."""
+    import os
+
+    cluster.submit("double", tasks.double, 21, heard)
+    ending = heard.end_of("double")
+    assert ending["state"] == "done"
+    assert ending["progress"] == {"cost": 0.5}
+    assert ending["result"] is not None
+    assert ending["result"]["value"] == 42
+    assert ending["result"]["priority"] == 19
+    assert ending["result"]["process"] != os.getpid()
+    assert heard.started.get(timeout=1) == "double"
+    told = [heard.progress.get(timeout=1) for _ in range(2)]
+    assert told == [("double", {"cost": 1.0}), ("double", {"cost": 0.5})]
+
+
+def test_a_running_task_stops_when_asked(cluster, heard):
+    cluster.submit("wait", tasks.wait, None, heard)
+    heard.progress.get(timeout=PATIENCE)
+    cluster.cancel("wait", grace=30.0)
+    assert heard.end_of("wait")["state"] == "cancelled"
+
+
+def test_a_deaf_task_is_killed_after_its_grace_and_the_worker_replaced(cluster, heard):
+    """Both workers are taken by two tasks at once afterwards."""
+    cluster.submit("deaf", tasks.ignore, None, heard)
+    heard.progress.get(timeout=PATIENCE)
+    cluster.cancel("deaf", grace=0.2)
+    assert heard.end_of("deaf")["state"] == "cancelled"
+    for name in ("left", "right"):
+        cluster.submit(name, tasks.wait, None, heard)
+    assert {heard.started.get(timeout=PATIENCE) for _ in range(3)} == {"deaf", "left", "right"}
+    for name in ("left", "right"):
+        cluster.cancel(name, grace=30.0)
+        assert heard.end_of(name)["state"] == "cancelled"
+
+
+def test_a_task_that_waits_for_a_worker_is_cancelled_at_once(cluster, heard):
+    for name in ("first", "second", "third"):
+        cluster.submit(name, tasks.wait, None, heard)
+    for _ in range(2):
+        heard.started.get(timeout=PATIENCE)
+    cluster.cancel("third", grace=30.0)
+    assert heard.end_of("third")["state"] == "cancelled"
+    for name in ("first", "second"):
+        cluster.cancel(name, grace=30.0)
+        assert heard.end_of(name)["state"] == "cancelled"
+
+
+def test_a_task_whose_worker_dies_is_tried_again(cluster, heard, tmp_path):
+    cluster.submit("phoenix", tasks.die_once, str(tmp_path / "died"), heard)
+    ending = heard.end_of("phoenix")
+    assert (ending["state"], ending["result"]) == ("done", {"value": "second time"})
+
+
+def test_a_task_that_kills_every_worker_fails_and_the_others_do_not(cluster, heard):
+    cluster.submit("poison", tasks.poison, None, heard)
+    ending = heard.end_of("poison")
+    assert ending["state"] == "failed"
+    assert ending["error"] is not None
+    assert ending["error"]["code"] == "worker-lost"
+    cluster.submit("after", tasks.double, 1, heard)
+    assert heard.end_of("after")["state"] == "done"
+
+
+def test_what_the_caller_can_mend_comes_back_as_its_sentence(cluster, heard):
+    """Also for an error that cannot be pickled."""
+    cluster.submit("refuse", tasks.refuse, None, heard)
+    ending = heard.end_of("refuse")
+    assert ending["state"] == "failed"
+    assert ending["error"] == {
+        "code": "simulation-diverged",
+        "detail": "The simulation diverged at t = 1.250 s in chassis.roll; soften it.",
+    }
+
+
+def test_an_unforeseen_error_is_logged_here_and_not_told(cluster, heard, caplog):
+    cluster.submit("crash", tasks.crash, None, heard)
+    ending = heard.end_of("crash")
+    assert ending["error"] is not None
+    assert ending["error"]["code"] == "internal"
+    assert "secret" not in ending["error"]["detail"]
+    assert "secret detail" in caplog.text
+
+
+def test_an_idle_cluster_leaves_and_comes_back(tmp_path, heard):
+    """Its processes are gone once nothing has run for a while; the next task starts new ones."""
+    import psutil
+
+    cluster = Cluster("", tmp_path, workers=1, idle_seconds=0.1)
+    try:
+        cluster.submit("one", tasks.double, 1, heard)
+        ending = heard.end_of("one")
+        assert ending["result"] is not None
+        first = ending["result"]["process"]
+        until = time.monotonic() + PATIENCE
+        while psutil.pid_exists(first):
+            assert time.monotonic() < until
+            time.sleep(0.05)
+        cluster.submit("two", tasks.double, 2, heard)
+        assert heard.end_of("two")["state"] == "done"
+    finally:
+        cluster.close()
+
+
+def test_the_same_seam_takes_a_scheduler_by_its_address(tmp_path, heard):
+    """Here one of our own, on loopback, started by Dask's own means."""
+    from distributed import LocalCluster
+
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, dashboard_address=None, local_directory=str(tmp_path)
+    ) as elsewhere:
+        cluster = Cluster(elsewhere.scheduler_address, tmp_path)
+        try:
+            cluster.submit("far", tasks.double, 4, heard)
+            assert heard.end_of("far")["state"] == "done"
+            cluster.submit("wait", tasks.wait, None, heard)
+            assert heard.progress.get(timeout=PATIENCE)
+            cluster.cancel("wait", grace=30.0)
+            assert heard.end_of("wait")["state"] == "cancelled"
+        finally:
+            cluster.close()
+
+
+def test_workers_that_cannot_be_reached_are_a_sentence(tmp_path, heard, monkeypatch):
+    monkeypatch.setenv("DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT", "1s")
+    from dask import config
+
+    with config.set({"distributed.comm.timeouts.connect": "1s"}):
+        cluster = Cluster("tcp://127.0.0.1:9", tmp_path)
+        with pytest.raises(Unavailable, match=r"tcp://127\.0\.0\.1:9"):
+            cluster.submit("lost", tasks.double, 1, heard)
+        cluster.close()
