@@ -1,0 +1,98 @@
+"""What can be seen wrong with a recording before any model: gaps, rest values, a_x against v_x.
+
+Every finding is a sentence naming run and channel; none of them stops anything.
+"""
+
+import math
+
+import numpy as np
+
+from .channels import Run, channel
+from .filters import low_pass, too_coarse
+from .frames import CORNERS
+
+REST_WINDOW = 0.5
+"""The start of a record looked at for rest, s."""
+
+REST_LIMITS = {
+    **{f"wheel.{corner}.z": 2e-3 for corner in CORNERS},
+    "chassis.z": 2e-3,
+    "chassis.pitch": math.radians(0.1),
+    "chassis.roll": math.radians(0.1),
+    "chassis.a_x": 0.1,
+}
+"""The rest value that passes, by channel, SI."""
+
+STILL_CHANNELS = (*(f"wheel.{corner}.z" for corner in CORNERS), "chassis.a_x")
+"""Channels that tell a standing car from a rolling one by how much they move."""
+
+STILL = 0.1
+"""Speed below which a car stands, m/s."""
+
+SLOW = 1.0
+"""a_x and v_x are compared below this frequency, Hz."""
+
+VARIES = 0.2
+"""dv_x/dt must vary by this much, m/s2 rms, to be held against a_x."""
+
+
+def check_recording(run: Run) -> list[str]:
+    """Findings about one run that has the channels of the rims mode."""
+    return [*_gaps(run), *_rest_values(run), *_acceleration_against_speed(run)]
+
+
+def _gaps(run: Run) -> list[str]:
+    steps = np.diff(run.time)
+    widest = int(np.argmax(steps))
+    if steps[widest] <= max(0.05, 10.0 * float(np.median(steps))):
+        return []
+    return [
+        f"Run {run.name} has no samples between {run.time[widest]:.2f} and "
+        f"{run.time[widest + 1]:.2f} s; the wheels' motion there is a guess, so cut the run."
+    ]
+
+
+def _rest_values(run: Run) -> list[str]:
+    """Channels that do not read zero while the car stands at the start of the record.
+
+    The car stands when its speed, if recorded, stays near zero and neither a wheel nor a_x moves.
+    """
+    start = run.time - run.time[0] <= REST_WINDOW
+    rolling = "chassis.v_x" in run and bool(np.any(np.abs(run["chassis.v_x"][start]) > STILL))
+    shaken = any(np.std(run[name][start]) > REST_LIMITS[name] for name in STILL_CHANNELS)
+    if rolling or shaken:
+        return []
+    readings = []
+    for name, limit in REST_LIMITS.items():
+        rest = float(np.mean(run[name][start])) if name in run else 0.0
+        if abs(rest) > limit:
+            shown = channel(name)
+            readings.append(f"{name} {shown.display_factor * rest:.3g} {shown.display_unit}")
+    if not readings:
+        return []
+    return [
+        f"Run {run.name} starts at rest, yet there it reads {', '.join(readings)}; the model "
+        "counts from rest, so subtract the rest value."
+    ]
+
+
+def _acceleration_against_speed(run: Run) -> list[str]:
+    """Fits dv_x/dt = c + s a_x, both below 1 Hz; s is 1 when sign and unit are right."""
+    if "chassis.v_x" not in run or too_coarse(float(np.mean(np.diff(run.time))), SLOW):
+        return []
+    slow = low_pass(run.time, np.column_stack([run["chassis.v_x"], run["chassis.a_x"]]), SLOW)
+    gained, a_x = np.gradient(slow[:, 0], run.time), slow[:, 1]
+    if np.std(gained) < VARIES or np.std(a_x) == 0.0:
+        return []
+    slope = float(np.cov(gained, a_x)[0, 1] / np.var(a_x, ddof=1))
+    if slope < -0.3:
+        return [
+            f"In run {run.name} chassis.a_x runs against the change of chassis.v_x; "
+            "one of them has the wrong sign, so multiply chassis.a_x by -1 if it is that one."
+        ]
+    if not 0.3 < slope < 3.0:
+        return [
+            f"In run {run.name} chassis.v_x changes {slope:.3g} times as fast as chassis.a_x says; "
+            "check the units of both."
+        ]
+    return []
