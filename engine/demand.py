@@ -23,6 +23,9 @@ from .vehicle import Vehicle
 REST_SPEED = 0.1
 """v0 in tanh(v/v0), m/s: below it resisting forces fade, so that a car at rest stays at rest."""
 
+SAME_INSTANT = 1e-9
+"""Knots closer than this are one to the point mass's motion, s."""
+
 
 @dataclass(frozen=True, eq=False)
 class PiecewiseLinear:
@@ -120,12 +123,13 @@ def point_mass_motion(
     per_mass = np.array([1.0 / vehicle.axle_at(c).wheel.radius for c in CORNERS])
     per_mass /= vehicle.total_mass
     knots = np.union1d(drive.knots, brake.knots)
-    inner = knots[(knots > 0.0) & (knots < duration)]
-    ends = np.concatenate(([0.0], inner, [duration]))
+    inner = knots[(knots > SAME_INSTANT) & (knots < duration - SAME_INSTANT)]
+    apart = np.diff(inner, prepend=0.0) > SAME_INSTANT
+    ends = np.concatenate(([0.0], inner[apart], [duration]))
     pieces = []
     for torque in (drive, brake):
-        pieces.append(tuple((torque.at(ends[:-1], "right") @ per_mass).tolist()))
-        pieces.append(tuple((torque.at(ends[1:], "left") @ per_mass).tolist()))
+        pieces.append(tuple((torque.at(ends[:-1] + SAME_INSTANT) @ per_mass).tolist()))
+        pieces.append(tuple((torque.at(ends[1:] - SAME_INSTANT) @ per_mass).tolist()))
     rolling = rolling_resistance(vehicle) * GRAVITY
     return _point_mass(tuple(ends.tolist()), *pieces, rolling, initial_speed, steps)
 

@@ -115,3 +115,14 @@ def test_rolling_resistance_weighs_the_axles_by_their_load():
     share = (1090 * 1.36 / 2.66 + 72) / 1240
     expected = 0.01 + 0.02 * share
     assert_allclose(rolling_resistance(replace(vehicle, front=front)), expected, rtol=1e-12)
+
+
+def test_knots_that_differ_by_rounding_are_one():
+    """A duration or a doubled knot off by one unit in the last place changes nothing."""
+    vehicle, end = paper_vehicle(), 1.003
+    torque = on_rear([0.0, 0.5, np.nextafter(0.5, 1.0), end], [100.0, 100.0, 0.0, 0.0])
+    exact = on_rear([0.0, 0.5, 0.5, end], [100.0, 100.0, 0.0, 0.0])
+    none = PiecewiseLinear.zero(end)
+    one = point_mass_motion(vehicle, torque, none, 5.0, np.nextafter(end, 2.0))
+    other = point_mass_motion(vehicle, exact, none, 5.0, end)
+    assert_allclose(one.x, other.x, rtol=1e-7)
