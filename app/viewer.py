@@ -31,7 +31,7 @@ FOG = (18, 22, 27)
 MESSAGE_BYTES = 64 << 20
 UNWATCHED_SECONDS = 600.0
 """How long a viewer without a tab is kept."""
-EYE, TARGET = (3.7, -4.6, 1.75), (0.0, 0.0, 0.45)
+EYE, TARGET = (3.3, -4.1, 1.45), (0.0, 0.0, 0.5)
 
 router = APIRouter()
 
@@ -191,4 +191,5 @@ async def _to_browser(websocket: WebSocket, upstream: ClientConnection) -> None:
             await websocket.send_bytes(message if isinstance(message, bytes) else message.encode())
     except ConnectionClosed:
         pass
-    await websocket.close(1012)
+    # 1002 tells viser's client that it is of another version; after all else it tries again.
+    await websocket.close(1002 if upstream.close_code == 1002 else 1012)

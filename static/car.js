@@ -48,8 +48,8 @@ function show() {
   get("vehicles").map((row) => h("option", { value: row.key, title: row.source ?? "" }, row.name)));
   const sliders = new Set(get("parameters").map(({ name }) => name));
   $("#car").replaceChildren(
-    h("div", { className: "row-tools" },
-      h("strong", { className: "grow" }, vehicle.name), others,
+    h("p", {}, h("strong", {}, vehicle.name)),
+    h("div", { className: "row-tools" }, others,
       h("button", { type: "button", on: { click: () => file.click() } }, "Open file …"), file,
       h("button", { type: "button", on: { click: download } }, "Save file")),
     h("p", { className: "hint" }, "What is known of the car, in SI units. Unlike the sliders, " +

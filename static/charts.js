@@ -2,6 +2,7 @@
 
 import { $, debounced, h, tabs } from "./dom.js";
 import { CORNERS, locate } from "./poses.js";
+import { AXIS, decades, powerOfTen } from "./plots.js";
 import { density } from "./spectrum.js";
 import { get, on } from "./store.js";
 import { clock, onTime, seek } from "./timeline.js";
@@ -11,7 +12,7 @@ const SPECTRUM = "spectrum of ";
 const GROUPS = {
   body: ["Body", ["chassis.z", "chassis.pitch", "chassis.roll"]],
   travel: ["Travel", CORNERS.map((c) => `suspension.${c}.travel`)],
-  tyre: ["Tyre load", CORNERS.map((c) => `tyre.${c}.load`)],
+  tyre: ["Tyres", CORNERS.map((c) => `tyre.${c}.load`)],
   seat: ["Seat", ["seat.driver.a_z", `${SPECTRUM}seat.driver.a_z`, "chassis.a_x", "chassis.v_x"]],
 };
 // Okabe and Ito's colours: told apart with any colour vision, and by their strokes as well.
@@ -21,6 +22,7 @@ const RUNS = [
   { key: "now", label: "now", stroke: "#e69f00", width: 1.6, dash: [] },
 ];
 const SYNC = "ride";
+const FREQUENCIES = [0.2, 30];
 const BOTTOM_AXIS = 38;
 const BARE_AXIS = 10;
 const CLICK_PIXELS = 4;
@@ -98,11 +100,13 @@ function chart(name, bottom, area) {
   const row = units.channel(name.replace(SPECTRUM, ""));
   const factor = spectrum ? row.display_factor ** 2 : row.display_factor;
   const unit = spectrum ? `(${row.display_unit})²/Hz` : row.display_unit;
-  const title = spectrum ? `Spectrum of ${row.label}` : capital(row.label);
+  const title = spectrum ? row.label.replace("acceleration", "spectrum") : row.label;
+  const signed = row.quantity === "angle" && row.sign.length < 20;
+  const sign = signed ? `, ${row.sign}` : "";
   const values = RUNS.map(({ key }) => h("span", { className: `reading ${key}` }));
   const box = h("figure", { className: "chart", dataset: { channel: name } },
-    h("figcaption", {}, h("span", { className: "chart-title" }, `${title} `,
-      h("span", { className: "unit" }, unit)), h("span", { className: "readings" }, values)),
+    h("figcaption", {}, h("span", { className: "chart-title", title: row.sign ?? "" },
+      `${title}${sign} `, h("span", { className: "unit" }, unit)), h("span", { className: "readings" }, values)),
     h("p", { className: "chart-empty", hidden: true }));
   area.append(box);
   const plot = new window.uPlot(options(name, spectrum, bottom || spectrum), [[], [], [], []], box);
@@ -114,21 +118,17 @@ function chart(name, bottom, area) {
 }
 
 function options(name, spectrum, labelled) {
-  const axis = {
-    stroke: "#93a0ae", font: "11px system-ui, sans-serif",
-    grid: { stroke: "#2a323c", width: 1 }, ticks: { stroke: "#2a323c", width: 1, size: 4 },
-  };
   const config = {
-    width: 300, height: 120, legend: { show: false }, padding: [6, 10, 0, 0],
+    width: 300, height: 120, legend: { show: false }, padding: [6, 14, 0, 0],
     scales: {
-      x: spectrum ? { time: false, distr: 3 } : { time: false },
+      x: spectrum ? { time: false, distr: 3, range: [...FREQUENCIES] } : { time: false },
       y: spectrum ? { distr: 3 } : { range: room },
     },
     axes: [
-      { ...axis, size: labelled ? BOTTOM_AXIS : BARE_AXIS, gap: 3, labelSize: 14,
+      { ...AXIS, size: labelled ? BOTTOM_AXIS : BARE_AXIS, gap: 3, labelSize: 14,
         label: labelled ? (spectrum ? "frequency, Hz" : "time, s") : undefined,
-        labelFont: axis.font, labelGap: 0, values: labelled ? undefined : (_, s) => s.map(() => "") },
-      { ...axis, size: 46, gap: 4 },
+        labelFont: AXIS.font, labelGap: 0, values: labelled ? undefined : (_, s) => s.map(() => "") },
+      { ...AXIS, size: 46, gap: 4 },
     ],
     series: [{}, ...RUNS.map(({ label, stroke, width, dash }) => ({
       label, stroke, width, dash, points: { show: false }, spanGaps: false,
@@ -137,12 +137,11 @@ function options(name, spectrum, labelled) {
     hooks: { setCursor: [pointed], ready: [clickable] },
   };
   if (spectrum) {
-    const decades = (_, splits) => splits.map((v) => {
-      const power = Math.log10(v);
-      return Math.abs(power - Math.round(power)) < 1e-6 ? power10(Math.round(power)) : null;
-    });
-    config.axes[0].values = decades;
-    config.axes[1].values = decades;
+    config.axes[0].splits = () => [0.2, 0.5, 1, 2, 5, 10, 20];
+    config.axes[0].values = (_, splits) => splits;
+    config.axes.forEach((axis) => { axis.filter = (_, splits) => splits; });
+    config.axes[1].splits = (_, _axis, low, high) => decades(low, high);
+    config.axes[1].values = (_, splits) => splits.map(powerOfTen);
     config.cursor.drag = { x: false, y: false };
     config.cursor.show = false;
     config.hooks = {};
@@ -152,11 +151,6 @@ function options(name, spectrum, labelled) {
   }
   return config;
 }
-
-const power10 = (power) =>
-  power >= -2 && power <= 3
-    ? String(10 ** power)
-    : `10${String(power).replace(/./g, (c) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)])}`;
 
 /** A little air above and below; a flat line lies in the middle. */
 function room(_, low, high) {
@@ -200,7 +194,7 @@ function fillSpectrum({ plot, factor }, runs, channel) {
     plot.setData([[], [], [], []]);
     return;
   }
-  const keep = first.frequency.map((f, i) => i).filter((i) => first.frequency[i] <= 30);
+  const keep = first.frequency.map((f, i) => i).filter((i) => first.frequency[i] <= FREQUENCIES[1]);
   plot.setData([
     keep.map((i) => first.frequency[i]),
     ...spectra.map((s) => keep.map((i) =>
@@ -271,10 +265,12 @@ function readings() {
   const t = hover ?? clock.time;
   for (const { plot, values, spectrum } of charts) {
     if (spectrum || !plot.data[0].length) continue;
+    const { min, max } = plot.scales.y;
+    const decimals = Math.min(Math.max(2 - Math.floor(Math.log10(max - min || 1)), 0), 6);
     const [i, w] = locate(plot.data[0], t);
     values.forEach((element, k) => {
       const value = plot.data[k + 1]?.[w > 0.5 ? i + 1 : i];
-      const text = value === null || value === undefined ? "" : units.number(value, 3);
+      const text = value === null || value === undefined ? "" : units.fixed(value, decimals);
       if (element.textContent !== text) element.textContent = text;
     });
   }
@@ -294,5 +290,3 @@ function resize() {
   }
   cursor();
 }
-
-const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);

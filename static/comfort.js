@@ -38,10 +38,10 @@ function row(metric, before) {
   const change = before && Math.abs(before.value) > 1e-12
     ? (metric.value - before.value) / Math.abs(before.value) : null;
   return h("tr", {},
-    h("th", { scope: "row" }, metric.label),
+    h("th", { scope: "row", title: metric.meaning ?? "" }, metric.label),
     h("td", {}, before ? units.number(before.value * factor, 3) : "–"),
     h("td", {}, units.number(metric.value * factor, 3)),
-    h("td", { className: "unit" }, metric.display_unit ?? metric.unit),
+    h("td", { className: "unit" }, units.pretty(metric.display_unit ?? metric.unit)),
     changed(change));
 }
 

@@ -3,7 +3,7 @@
 // The truth is `values` of the store (SI); a slider shows it, clamped to its range. On each track
 // lie the baseline (a tick) and, after a fit, the 95 % interval of the identified value (a band).
 
-import { $, h, symbol } from "./dom.js";
+import { $, capital, h, symbol } from "./dom.js";
 import { get, on, set } from "./store.js";
 import * as units from "./units.js";
 
@@ -15,6 +15,9 @@ export const DETERMINED = {
   no: "not determined",
 };
 const rows = new Map();
+
+/** An interval may be unbounded: the run says nothing about the parameter. */
+export const isBounded = (interval) => Boolean(interval?.every(Number.isFinite));
 
 export const valueAt = (vehicle, path) => path.split(".").reduce((part, key) => part[key], vehicle);
 
@@ -115,10 +118,10 @@ function row(parameter, side) {
   return parts.element;
 }
 
-/** "Front spring stiffness" under "Front axle" is "spring stiffness". */
-export function plainLabel(parameter, side) {
+/** "Front stabilizer bar stiffness" under "Front axle" is "Bar stiffness"; the title says it all. */
+function plainLabel(parameter, side) {
   const text = parameter.label.replace(new RegExp(`^${side}\\s+|,?\\s*${side}$`, "i"), "");
-  return text.charAt(0).toUpperCase() + text.slice(1);
+  return capital(text.replace("stabilizer bar", "bar"));
 }
 
 function nudge(event, slider, step, lower, upper, change) {
@@ -163,11 +166,12 @@ function show() {
 
 function band(parts, estimate, factor, at) {
   const { interval, spread, parameter } = parts;
-  const known = Boolean(estimate?.confidence_interval);
+  const known = isBounded(estimate?.confidence_interval);
   interval.hidden = !known;
   if (!known) {
-    spread.textContent = "";
-    spread.title = "";
+    spread.textContent = estimate ? "± ∞" : "";
+    spread.className = "spread no";
+    spread.title = estimate ? "The runs say nothing about this parameter" : "";
     return;
   }
   const [low, high] = estimate.confidence_interval.map((x) => x * factor);
@@ -176,7 +180,7 @@ function band(parts, estimate, factor, at) {
   interval.className = `interval ${estimate.determined}`;
   const half = (high - low) / 2;
   const value = estimate.value * factor;
-  spread.textContent = half > Math.abs(value) ? "± over 100 %" : `± ${units.number(half, 2)}`;
+  spread.textContent = half > Math.abs(value) ? "± >100 %" : `± ${units.number(half, 2)}`;
   spread.className = `spread ${estimate.determined}`;
   spread.title =
     `Identified ${units.number(value)} ${parameter.display_unit}, 95 % interval ` +

@@ -1,31 +1,33 @@
 // The cost over the steps of a fit, on a logarithmic scale.
 
 import { h } from "./dom.js";
-
-const HEIGHT = 92;
+import { AXIS, decades, fitWidth, powerOfTen } from "./plots.js";
 
 /** {element, show(history)}. */
-export function costChart() {
+export function costChart(height) {
   const element = h("div", { className: "cost", role: "img", "aria-label": "Cost over the steps" });
-  const axis = { stroke: "#93a0ae", font: "10px system-ui, sans-serif",
-    grid: { stroke: "#2a323c", width: 1 }, ticks: { show: false } };
+  element.style.minHeight = `${height}px`;
   let plot = null;
   const show = (history) => {
     if (!element.isConnected || !history.length) return;
-    const data = [history.map((_, i) => i), history];
+    const data = [history.map((_, i) => i + 1), history];
     if (plot) {
       plot.setData(data);
       return;
     }
     plot = new window.uPlot({
-      width: Math.max(element.clientWidth, 120), height: HEIGHT, legend: { show: false },
-      cursor: { show: false }, padding: [6, 6, 0, 0],
+      width: Math.max(element.clientWidth, 120), height, legend: { show: false },
+      cursor: { show: false }, padding: [6, 10, 0, 0],
       scales: { x: { time: false }, y: { distr: 3 } },
-      axes: [{ ...axis, size: 18, gap: 2 }, { ...axis, size: 40, gap: 2,
-        values: (_, splits) => splits.map((v) =>
-          (Math.abs(Math.log10(v) % 1) < 1e-9 ? v.toExponential(0) : "")) }],
-      series: [{}, { stroke: "#e69f00", width: 1.5, points: { show: history.length < 60, size: 4 } }],
+      axes: [
+        { ...AXIS, size: 22, gap: 2, incrs: [1, 2, 5, 10, 20, 50, 100, 200, 500] },
+        { ...AXIS, size: 40, gap: 2, filter: (_, splits) => splits,
+          splits: (_, _axis, low, high) => decades(low, high),
+          values: (_, splits) => splits.map(powerOfTen) },
+      ],
+      series: [{}, { stroke: "#e69f00", width: 1.5, points: { show: true, size: 4 } }],
     }, data, element);
+    fitWidth(plot, element);
   };
   return { element, show };
 }

@@ -19,6 +19,11 @@ export function h(tag, props = {}, ...children) {
   return element;
 }
 
+export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+
+/** A file name that may break after its underscores. */
+export const breakable = (name) => name.split(/(?<=[_-])/).flatMap((part) => [part, h("wbr")]);
+
 /** A parameter's symbol such as `K_F` or `phi_R`, with its index set low. */
 export function symbol(text) {
   const [base, index] = text.split("_");

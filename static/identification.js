@@ -1,15 +1,16 @@
 // Identification: choose runs and free parameters, watch the fit, read it, apply it.
 
 import * as api from "./api.js";
-import { DETERMINED } from "./controls.js";
+import { DETERMINED, isBounded } from "./controls.js";
 import { percent, short } from "./comfort.js";
 import { costChart } from "./cost.js";
-import { $, h, symbol } from "./dom.js";
+import { $, breakable, h, symbol } from "./dom.js";
 import { notice, refused } from "./notices.js";
 import { get, on, set } from "./store.js";
 import * as units from "./units.js";
 
 const ROLES = { fit: "fit", holdout: "hold out", no: "leave out" };
+const WELL = { yes: "well", weakly: "weakly", no: "not" };
 const STATES = {
   queued: "Waiting for a worker …",
   running: "Fitting …",
@@ -208,7 +209,7 @@ function setup() {
 function runRow(run) {
   const role = roleOf(run);
   return h("tr", {},
-    h("th", { scope: "row", title: run.name }, run.name),
+    h("th", { scope: "row", title: run.name }, breakable(run.name)),
     h("td", {}, run.usable_for_identification
       ? select(ROLES, role, (value) => { choice.roles[run.id] = value; },
         { "aria-label": `Use of ${run.name}` })
@@ -254,7 +255,7 @@ function freeRow(parameter) {
       } },
     })),
     h("th", { scope: "row", title: parameter.label }, symbol(parameter.symbol), " ",
-      h("span", { className: "soft" }, parameter.label)),
+      h("span", { className: "soft long" }, parameter.label)),
     h("td", {}, units.number(start * factor)),
     h("td", {}, bound(0, "Lower")), h("td", {}, bound(1, "Upper")),
     h("td", { className: "unit" }, unit));
@@ -274,23 +275,32 @@ function fit() {
       "few seconds.");
   }
   const { result } = job;
-  cost = costChart();
+  cost = costChart(result ? 92 : 150);
+  if (!result) return running();
+  return h("div", { className: "fit" },
+    h("div", { className: "fit-main scrolls" },
+      h("p", { className: `outcome ${job.state}`, id: "outcome" }, outcome()),
+      estimates(result),
+      result.warnings.length
+        ? h("ul", { className: "warnings" }, result.warnings.map((text) => h("li", {}, text)))
+        : null),
+    h("div", { className: "fit-side scrolls" },
+      h("button", { type: "button", id: "apply", className: "primary wide",
+        on: { click: () => hooks.apply(result) } }, "Apply to sliders"),
+      scores(result),
+      h("h3", {}, "Cost"), cost.element, h("p", { className: "hint", id: "cost-now" })));
+}
+
+/** While it runs, or after it was stopped: the curve and the best car so far. */
+function running() {
   return h("div", { className: "fit" },
     h("div", { className: "fit-main scrolls" },
       h("p", { className: `outcome ${job.state}`, id: "outcome" }, outcome()),
       job.error ? h("div", { className: "problem", role: "alert" },
         h("strong", {}, "The identification failed"), h("p", {}, job.error.detail)) : null,
-      result ? estimates(result) : null),
-    h("div", { className: "fit-side scrolls" },
-      result
-        ? h("button", { type: "button", id: "apply", className: "primary wide",
-            on: { click: () => hooks.apply(result) } }, "Apply to sliders")
-        : null,
-      result ? scores(result) : null,
-      h("h3", {}, "Cost"), cost.element, h("p", { className: "hint", id: "cost-now" }),
-      result?.warnings?.length
-        ? h("ul", { className: "warnings" }, result.warnings.map((text) => h("li", {}, text)))
-        : null));
+      h("h3", {}, "Cost"), cost.element, h("p", { className: "hint", id: "cost-now" })),
+    h("div", { className: "fit-side scrolls" }, h("h3", {}, "Best so far"),
+      h("table", { className: "best" }, h("tbody", { id: "best" }))));
 }
 
 function outcome() {
@@ -307,6 +317,12 @@ function advance() {
   cost.show(history);
   const last = history.at(-1) ?? progress?.cost;
   const simulations = job.result?.simulations ?? progress?.simulations ?? 0;
+  $("#best")?.replaceChildren(...Object.entries(progress?.parameters ?? {}).map(([name, value]) => {
+    const row = units.parameter(name);
+    return h("tr", {}, h("th", { scope: "row", title: row.label }, symbol(row.symbol)),
+      h("td", {}, units.number(value * row.display_factor)),
+      h("td", { className: "unit" }, row.display_unit));
+  }));
   $("#cost-now").textContent = last === undefined || last === null ? "Not started yet."
     : `${units.number(last, 4)} after ${history.length} steps, ${simulations} simulations`;
 }
@@ -314,23 +330,24 @@ function advance() {
 function estimates(result) {
   return h("table", { className: "estimates" },
     h("thead", {}, h("tr", {},
-      ["Parameter", "Value", "Unit", "95 % interval", "Start", ""].map((text) =>
-        h("th", { scope: "col" }, text)))),
+      ["Parameter", "Value", "Unit", "95 % interval", "Start", "Determined"].map((text) =>
+        h("th", { scope: "col", className: text === "Start" ? "long" : "" }, text)))),
     h("tbody", {}, result.parameters.map((estimate) => {
       const row = units.parameter(estimate.name);
       const factor = row.display_factor;
       const interval = estimate.confidence_interval;
       return h("tr", {},
         h("th", { scope: "row", title: row.label }, symbol(row.symbol), " ",
-          h("span", { className: "soft" }, row.label)),
+          h("span", { className: "soft long" }, row.label)),
         h("td", { className: "strong" }, units.number(estimate.value * factor)),
         h("td", { className: "unit" }, row.display_unit),
-        h("td", {}, interval
+        h("td", { className: "span" }, isBounded(interval)
           ? `${units.number(interval[0] * factor, 4)} … ${units.number(interval[1] * factor, 4)}`
-          : "–"),
-        h("td", { className: "soft" }, units.number(estimate.start * factor)),
-        h("td", {}, h("span", { className: `determined ${estimate.determined}` },
-          DETERMINED[estimate.determined] ?? estimate.determined)));
+          : "unbounded"),
+        h("td", { className: "soft long" }, units.number(estimate.start * factor)),
+        h("td", {}, h("span", {
+          className: `determined ${estimate.determined}`, title: DETERMINED[estimate.determined],
+        }, WELL[estimate.determined])));
     })));
 }
 
@@ -344,7 +361,7 @@ function scores(result) {
   const channels = [...new Set([...fitted, ...unseen].flatMap(([, , score]) =>
     score && typeof score === "object" ? Object.keys(score) : []))];
   return h("table", { className: "scores" },
-    h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Fit"),
+    h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Fit, %"),
       channels.map((channel) => h("th", { scope: "col" }, short(channel))))),
     h("tbody", {}, [...fitted, ...unseen].map(([name, role, score]) =>
       h("tr", { className: role === "fitted" ? "" : "held-out" },
@@ -353,5 +370,5 @@ function scores(result) {
         typeof score === "string"
           ? h("td", { colSpan: channels.length || 1 }, score)
           : channels.map((channel) => h("td", {},
-            score ? percent(score[channel]) : "…"))))));
+            score ? percent(score[channel]).replace(" %", "") : "…"))))));
 }

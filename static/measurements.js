@@ -1,14 +1,15 @@
 // Measured rides: add by button or by dropping files, look at them, delete them.
 
 import * as api from "./api.js";
-import { $, h } from "./dom.js";
+import { $, breakable, h } from "./dom.js";
 import { notice } from "./notices.js";
+import { AXIS, fitWidth } from "./plots.js";
 import { choose } from "./ride.js";
 import { get, on, set } from "./store.js";
 import * as units from "./units.js";
 
 const PREVIEW_SAMPLES = 1500;
-const TINTS = ["#e69f00", "#56b4e9", "#cc79a7", "#c9ced6"];
+const MEASURED = "#c9ced6";
 
 let selected = null;
 let failures = [];
@@ -99,7 +100,7 @@ function table(rows) {
         h("th", { scope: "row" }, h("button", {
           type: "button", className: "link", "aria-pressed": row.id === selected,
           on: { click: () => { selected = row.id; show(); } },
-        }, row.name)),
+        }, breakable(row.name))),
         h("td", {}, `${units.number(row.duration, 3)} s`),
         h("td", {}, `${units.number(1000 * row.sample_step, 3)} ms`),
         h("td", {}, row.channels.filter(({ name }) => name !== "time").length),
@@ -128,13 +129,13 @@ async function detail(row) {
   }
   const names = row.channels.map(({ name }) => name).filter((name) => name !== "time");
   const choice = h("select", { "aria-label": "Channel to look at" },
-    names.map((name) => h("option", { value: name }, capital(units.channel(name).label))));
+    names.map((name) => h("option", { value: name }, units.channel(name).label)));
   const drawing = h("div", { className: "preview" });
   const facts = h("p", { className: "hint" });
   choice.addEventListener("change", () => preview(row, choice.value, drawing, facts));
   parts.detail.replaceChildren(
     h("div", { className: "row-tools" },
-      h("strong", { className: "grow" }, row.name),
+      h("strong", { className: "name" }, breakable(row.name)),
       row.usable_for_identification
         ? h("button", { type: "button", on: { click: () => choose(`measurement ${row.id}`) } },
             "Drive it")
@@ -166,15 +167,14 @@ async function preview(row, name, drawing, facts) {
   }
   if (row.id !== selected || !drawing.isConnected) return;
   plot?.destroy();
-  const axis = { stroke: "#93a0ae", font: "11px system-ui, sans-serif",
-    grid: { stroke: "#2a323c", width: 1 }, ticks: { stroke: "#2a323c", width: 1, size: 4 } };
   plot = new window.uPlot({
     width: Math.max(drawing.clientWidth, 200), height: 132, legend: { show: false },
     scales: { x: { time: false } }, cursor: { show: false }, padding: [6, 10, 0, 0],
-    axes: [{ ...axis, size: 26, gap: 3 }, { ...axis, size: 46, gap: 4 }],
-    series: [{}, { stroke: TINTS[0], width: 1.2, points: { show: false } }],
+    axes: [{ ...AXIS, size: 26, gap: 3 }, { ...AXIS, size: 46, gap: 4 }],
+    series: [{}, { stroke: MEASURED, width: 1.2, points: { show: false } }],
   }, [Array.from(run.time), Array.from(run.values[name], (v) =>
     (Number.isFinite(v) ? v * factor : null))], drawing);
+  fitWidth(plot, drawing);
 }
 
 /** Deleting asks once, in place. */
@@ -194,5 +194,3 @@ async function remove(row, event) {
     else notice("error", `${row.name} stays`, error.message);
   }
 }
-
-const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);

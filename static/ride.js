@@ -3,6 +3,9 @@
 import { $, h } from "./dom.js";
 import { get, on, set } from "./store.js";
 
+/** Where a single bump or hole lies, m ahead of the standing car's CG. */
+const SHAPE_AT = 20;
+
 /** Fill the choices of the header and follow them. */
 export function build() {
   $("#ride").addEventListener("change", () => choose($("#ride").value));
@@ -24,11 +27,15 @@ export function build() {
 
 /** Roads to choose from, of what the service can build. */
 function roadChoices(roads) {
-  const classes = (roads?.classes ?? []).map((name) => [
-    `ISO 8608 class ${name}`,
-    { sections: [[name, 0]] },
-  ]);
-  return classes;
+  const kinds = new Set(roads.kinds);
+  const shapes = [
+    ["flat", { kind: "flat" }],
+    ["one bump, 50 mm", { kind: "bump", begin: SHAPE_AT, length: 1, height: 0.05 }],
+    ["one pothole, 40 mm, right", { kind: "pothole", begin: SHAPE_AT, length: 0.8, depth: 0.04 }],
+  ];
+  const classes = kinds.has("iso8608") ? roads.classes.map((name) => [
+    `ISO 8608 class ${name}`, { kind: "iso8608", sections: [{ class: name }] }]) : [];
+  return [...shapes.filter(([, { kind }]) => kinds.has(kind)), ...classes];
 }
 
 /** Choose by key: "measurement ID" or "manoeuvre KEY". */

@@ -7,7 +7,7 @@ import { get, on } from "./store.js";
 import { clock, onTime } from "./timeline.js";
 
 const CAMERAS = {
-  "three-quarter": [[3.7, -4.6, 1.75], [0, 0, 0.45]],
+  "three-quarter": [[3.3, -4.1, 1.45], [0, 0, 0.5]],
   side: [[0, -6.4, 0.75], [0, 0, 0.55]],
   front: [[6.2, -0.01, 0.95], [0, 0, 0.55]],
   top: [[0, -0.02, 7.2], [0, 0, 0]],

@@ -53,11 +53,10 @@ export function build() {
   const factor = h("output", { className: "factor", htmlFor: "magnification" });
   parts = { play, slider, readout, factor, magnify };
   $("#transport").append(
-    play, slider, readout,
-    h("label", { className: "inline" }, "Speed ", speed),
-    h("label", { className: "inline", title: "Motion drawn larger than it is" },
-      "Motion ", magnify, factor),
-  );
+    play, slider, readout, h("label", { className: "inline" }, "Speed ", speed));
+  $(".view-tools").append(
+    h("label", { className: "inline", title: "Motion is drawn this many times larger than it is" },
+      "Motion ", magnify, factor));
   changed();
 }
 

@@ -1,20 +1,32 @@
 // Display units, in one place: the service's tables say how SI is shown.
 
+import { capital } from "./dom.js";
+
 const channels = new Map();
 const parameters = new Map();
 
 /** Take the tables of /api/channels and /api/parameters. */
 export function learn(channelRows, parameterRows) {
-  channelRows.forEach((row) => channels.set(row.name, row));
-  parameterRows.forEach((row) => parameters.set(row.name, row));
+  for (const [rows, table] of [[channelRows, channels], [parameterRows, parameters]]) {
+    for (const row of rows) table.set(row.name, { ...row, display_unit: pretty(row.display_unit) });
+  }
 }
+
+/** `m/s^2` as it is written by hand. */
+export const pretty = (unit) => unit.replace("^2", "²").replace("^1.75", "¹·⁷⁵");
 
 /** A channel's row, or a plain one for a name the table does not have. */
 export function channel(name, unit = "") {
-  return (
-    channels.get(name) ??
-    { name, label: name, unit, display_unit: unit, display_factor: 1 }
-  );
+  return channels.get(name) ?? atPoint(name, unit);
+}
+
+/** Accelerations at chassis points follow a pattern, since the points are the user's own. */
+function atPoint(name, unit) {
+  const [, kind, point, axis] = /^(seat|point)\.(\w+)\.a_([xyz])$/.exec(name) ?? [];
+  const where = point?.replaceAll("_", " ");
+  const label = point
+    ? `${capital(where)}${kind === "seat" ? " seat" : ""} acceleration, along ${axis}` : name;
+  return { name, label, unit, display_unit: point ? "m/s²" : unit, display_factor: 1 };
 }
 
 export const parameter = (name) => parameters.get(name);
@@ -27,6 +39,12 @@ export function number(value, digits = 4) {
   if (size >= 7 || size < -5) return minus(value.toExponential(digits - 1));
   return minus(value.toFixed(Math.min(Math.max(digits - 1 - size, 0), 6)));
 }
+
+/** A number with so many decimals, for readings that change in place. */
+export const fixed = (value, decimals) => {
+  const text = value.toFixed(decimals);
+  return minus(Number(text) === 0 ? (0).toFixed(decimals) : text);
+};
 
 /** The same without padding zeros, as an input field wants it. */
 export function plain(value, digits = 5) {

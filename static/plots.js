@@ -1,0 +1,34 @@
+// What all plots share: their axes' look, powers of ten, and a size that follows their box.
+
+export const AXIS = {
+  stroke: "#93a0ae",
+  font: "11px system-ui, sans-serif",
+  grid: { stroke: "#2a323c", width: 1 },
+  ticks: { stroke: "#2a323c", width: 1, size: 4 },
+};
+
+/** Keep a plot as wide as its box for as long as it is on the page. */
+export function fitWidth(plot, box) {
+  const watch = new ResizeObserver(() => {
+    if (!box.isConnected) watch.disconnect();
+    else if (box.clientWidth > 0 && box.clientWidth !== plot.width) {
+      plot.setSize({ width: box.clientWidth, height: plot.height });
+    }
+  });
+  watch.observe(box);
+}
+
+/** A logarithmic axis with lines at the powers of ten only. */
+export function decades(low, high) {
+  const first = Math.floor(Math.log10(low) + 1e-9);
+  const last = Math.ceil(Math.log10(high) - 1e-9);
+  return Array.from({ length: last - first + 1 }, (_, i) => 10 ** (first + i));
+}
+
+/** 0.01 to 1000 as they are, other powers of ten with their exponent. */
+export function powerOfTen(value) {
+  const power = Math.round(Math.log10(value));
+  if (power >= -2 && power <= 3) return String(Number((10 ** power).toPrecision(1)));
+  const raised = String(power).replace(/./g, (c) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)]);
+  return `10${raised}`;
+}

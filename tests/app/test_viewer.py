@@ -1,0 +1,131 @@
+"""The 3D view's way through our own address: whose it is, what it may load, what it passes on."""
+
+import time
+
+import pytest
+from ridetune.app import viewer
+from ridetune.app.viewer import Viewers
+from ridetune.engine.vehicle_file import reference_vehicles
+from starlette.websockets import WebSocketDisconnect
+from viser import __version__ as viser_version
+from viser import _messages as messages
+
+from .conftest import ADDRESS
+
+PROTOCOL = f"viser-v{viser_version}"
+SOCKETS = ADDRESS.replace("http", "ws")
+
+
+@pytest.fixture
+def viewers():
+    viewers = Viewers()
+    yield viewers
+    viewers.close()
+
+
+@pytest.fixture
+def car():
+    return reference_vehicles()["paper"]
+
+
+def bearer(visitor):
+    return {"Authorization": f"Bearer {visitor.token}"}
+
+
+def open_socket(client, visitor, protocol=PROTOCOL, **headers):
+    return client.websocket_connect(
+        f"{SOCKETS}/s/{visitor.id}/viewer",
+        subprotocols=[protocol],
+        headers={"Origin": ADDRESS} | bearer(visitor) | headers,
+    )
+
+
+def test_the_page_is_visers_own_with_the_bridge_before_it(client, visitor):
+    page = client.get(f"/s/{visitor.id}/viewer/", headers=bearer(visitor))
+    assert page.status_code == 200
+    assert page.text.index("window.bridge") < page.text.index("<title>")
+
+
+def test_the_page_may_talk_to_nobody_but_this_service(client, visitor):
+    """viser's ?websocket= would let a stranger's scene run in our origin."""
+    policy = client.get(f"/s/{visitor.id}/viewer/", headers=bearer(visitor)).headers[
+        "content-security-policy"
+    ]
+    rules = dict(rule.strip().split(" ", 1) for rule in policy.split(";"))
+    assert rules["default-src"] == "'none'"
+    assert rules["connect-src"] == "'self' data: blob:"
+    assert rules["frame-ancestors"] == "'self'"
+
+
+def test_a_strangers_view_is_not_found(client, visitor):
+    other = {"Authorization": "Bearer wrong"}
+    assert client.get(f"/s/{visitor.id}/viewer/", headers=other).status_code == 404
+    with (
+        pytest.raises(WebSocketDisconnect) as refused,
+        open_socket(client, visitor, **other),
+    ):
+        pass
+    assert refused.value.code == 1008
+
+
+def test_a_page_of_another_origin_gets_no_socket(client, visitor):
+    with (
+        pytest.raises(WebSocketDisconnect),
+        open_socket(client, visitor, Origin="http://evil.example"),
+    ):
+        pass
+
+
+def test_the_relay_brings_the_scene_to_the_browser(client, visitor, car):
+    client.app.state.services.viewers.show(visitor.id, car)
+    with open_socket(client, visitor) as socket:
+        assert socket.accepted_subprotocol == PROTOCOL
+        received = b""
+        while b"viser" not in received and len(received) < 100_000:
+            received += socket.receive_bytes()
+    assert len(received) > 1000
+
+
+def test_a_client_of_another_version_is_told_so(client, visitor):
+    with (
+        open_socket(client, visitor, "viser-v0.0.1") as socket,
+        pytest.raises(WebSocketDisconnect) as refused,
+    ):
+        socket.receive_bytes()
+    assert refused.value.code == 1002
+
+
+def test_each_session_has_a_viewer_of_its_own(viewers, car):
+    viewers.show("a", car)
+    viewers.show("b", car)
+    assert viewers.start("a") is viewers.start("a")
+    assert viewers.start("a").address != viewers.start("b").address
+
+
+def test_viewers_listen_on_loopback_only(viewers):
+    assert viewers.start("a").server.get_host() == "127.0.0.1"
+
+
+def test_no_tab_can_open_a_tunnel_to_the_world(viewers):
+    handlers = viewers.start("a").server._websock_server._incoming_handlers
+    assert messages.ShareUrlRequest not in handlers
+
+
+def test_only_unwatched_viewers_are_reaped(viewers, monkeypatch):
+    monkeypatch.setattr(viewer, "UNWATCHED_SECONDS", 0.0)
+    viewers.watch("watched", 1)
+    gone = viewers.start("gone")
+    time.sleep(0.01)
+    viewers.reap()
+    assert viewers.start("gone") is not gone
+    assert viewers.start("watched").watchers == 1
+
+
+def test_stopping_what_is_not_there_is_nothing(viewers):
+    viewers.stop("nobody")
+    viewers.reap()
+
+
+def test_starting_prints_no_banner(viewers, capsys):
+    viewers.start("a")
+    assert capsys.readouterr().out == ""
