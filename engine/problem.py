@@ -1,0 +1,290 @@
+"""What an identification is asked: runs, a car, free parameters, and the noise of each channel.
+
+`Problem.build` checks everything a caller can mend before any simulation, and prepares the inputs
+of the rims mode once for all of them.
+"""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .channels import Run
+from .errors import ProblemError, VehicleError
+from .parameters import PARAMETER_NAMES, default_bounds, parameter
+from .rims import OUTPUT_CHANNELS, RimsInputs, RimsSettings, filtered_outputs, prepare
+from .simulation import Traction
+from .vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+DEFAULT_NOISE = {
+    "chassis.z": 0.5e-3,
+    "chassis.pitch": math.radians(0.02),
+    "chassis.roll": math.radians(0.02),
+}
+"""Standard deviation of a channel's noise where neither the run nor the caller states one."""
+
+
+@dataclass(frozen=True, slots=True)
+class FreeParameter:
+    """A number to be found, in SI: dotted path, start value and bounds."""
+
+    name: str
+    start: float
+    lower: float
+    upper: float
+
+    @property
+    def scale(self) -> float:
+        """Typical size: |start|, at least a twentieth of the range between the bounds."""
+        return max(abs(self.start), 0.05 * (self.upper - self.lower))
+
+    @property
+    def logarithmic(self) -> bool:
+        """Whether the optimiser works on the logarithm: for all but angles and bounds at zero."""
+        return self.lower * self.upper > 0.0 and not self.name.endswith("pivot.angle")
+
+    def variable(self, value: float) -> float:
+        """The optimiser's variable: log |value / scale|, or value / scale."""
+        ratio = value / self.scale
+        return math.log(abs(ratio)) if self.logarithmic else ratio
+
+    def value(self, variable: float) -> float:
+        """The parameter at a variable, kept between the bounds against rounding."""
+        ratio = math.copysign(math.exp(variable), self.lower) if self.logarithmic else variable
+        return min(max(ratio * self.scale, self.lower), self.upper)
+
+    def slope(self, variable: float) -> float:
+        """d value / d variable."""
+        return self.value(variable) if self.logarithmic else self.scale
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """One run as the fit compares it.
+
+    measured : channel -> (samples,) through the output filter
+    noise : channel -> standard deviation, SI
+    """
+
+    name: str
+    inputs: RimsInputs
+    measured: Mapping[str, Array]
+    noise: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """A checked identification problem; `vehicle` carries the start values."""
+
+    vehicle: Vehicle
+    observations: tuple[Observation, ...]
+    free: tuple[FreeParameter, ...]
+    traction: Traction
+    settings: RimsSettings
+
+    @classmethod
+    def build(
+        cls,
+        vehicle: Vehicle,
+        runs: Sequence[Run],
+        free: Iterable[str] | None = None,
+        fixed: Iterable[str] | None = None,
+        *,
+        bounds: Mapping[str, tuple[float, float]] | None = None,
+        start: Mapping[str, float] | None = None,
+        noise: Mapping[str, float] | None = None,
+        outputs: Sequence[str] | Mapping[str, Sequence[str]] | None = None,
+        traction: Traction = "exact",
+        settings: RimsSettings | None = None,
+    ) -> "Problem":
+        """A problem from its parts, or one sentence on what is wrong with them.
+
+        free : names or symbols of the parameters to find; all twelve without
+        fixed : those to leave at the vehicle's (or the start's) value
+        bounds, start : by parameter name; default_bounds and the vehicle's values without
+        noise : standard deviation by channel, over what the runs state, over DEFAULT_NOISE
+        outputs : channels to compare, for all runs or by run name; all that a run has without
+
+        Raises ProblemError, ParameterError, MeasurementError or VehicleError.
+        """
+        settings = settings or RimsSettings()
+        if traction not in get_args(Traction):
+            raise ProblemError(f'traction is "{traction}"; it can be "exact" or "paper".')
+        start = {parameter(name).name: value for name, value in (start or {}).items()}
+        try:
+            vehicle = vehicle.with_values(start)
+        except VehicleError as error:
+            raise ProblemError(f"A start value cannot be used: {error}") from error
+        names = _free_names(free, fixed)
+        limits = {parameter(name).name: limit for name, limit in (bounds or {}).items()}
+        parameters = tuple(_free_parameter(vehicle, name, limits.get(name)) for name in names)
+        observations = _observations(vehicle, runs, noise or {}, outputs, settings)
+        samples = sum(len(measured) for seen in observations for measured in seen.measured.values())
+        if samples <= len(parameters):
+            raise ProblemError(
+                f"{samples} samples cannot determine {len(parameters)} parameters; free fewer "
+                "or measure longer."
+            )
+        return cls(vehicle, observations, parameters, traction, settings)
+
+    def values(self, x: Array) -> Array:
+        """The free parameters at the optimiser's variables x."""
+        return np.array([one.value(float(v)) for one, v in zip(self.free, x, strict=True)])
+
+    def vehicle_at(self, x: Array) -> Vehicle:
+        """The car at the optimiser's variables x."""
+        names = (one.name for one in self.free)
+        return self.vehicle.with_values(dict(zip(names, self.values(x).tolist(), strict=True)))
+
+
+def _free_names(free: Iterable[str] | None, fixed: Iterable[str] | None) -> list[str]:
+    held = _listed(fixed or (), "fixed")
+    wanted = list(PARAMETER_NAMES) if free is None else _listed(free, "free")
+    both = [name for name in held if free is not None and name in wanted]
+    if both:
+        raise ProblemError(f"{both[0]} is listed both as free and as fixed; leave one of the two.")
+    names = [name for name in PARAMETER_NAMES if name in wanted and name not in held]
+    if not names:
+        raise ProblemError(
+            "No parameter is free; free at least one, e.g. front.suspension.stiffness."
+        )
+    return names
+
+
+def _listed(names: Iterable[str], role: str) -> list[str]:
+    known = [parameter(name).name for name in names]
+    doubled = [name for k, name in enumerate(known) if name in known[:k]]
+    if doubled:
+        raise ProblemError(f"{doubled[0]} is listed twice as {role}; list it once.")
+    return known
+
+
+def _free_parameter(
+    vehicle: Vehicle, name: str, limits: tuple[float, float] | None
+) -> FreeParameter:
+    start = vehicle.value(name)
+    unit = parameter(name).unit
+    if limits is not None:
+        lower, upper = (float(limit) for limit in limits)
+    else:
+        lower, upper = default_bounds(name, start)
+    if not (math.isfinite(lower) and math.isfinite(upper)):
+        raise ProblemError(f"The bounds of {name}, {lower} to {upper}, must be finite numbers.")
+    if lower >= upper:
+        raise ProblemError(
+            f"The bounds of {name}, {lower:g} to {upper:g} {unit}, are crossed or leave no room; "
+            "give the lower one first, or fix the parameter."
+        )
+    if not lower <= start <= upper:
+        raise ProblemError(
+            f"{name} starts at {start:g} {unit}, outside its bounds {lower:g} to {upper:g} {unit}; "
+            "move the start or the bounds."
+        )
+    if name.endswith("pivot.distance") and lower < 0.0 < upper:
+        raise ProblemError(
+            f"The bounds of {name}, {lower:g} to {upper:g} {unit}, span zero, where the pivot "
+            "would be at the wheel; keep both on the side of the start value."
+        )
+    try:
+        for limit in (lower, upper):
+            vehicle.with_values({name: limit})
+    except VehicleError as error:
+        raise ProblemError(f"A bound of {name} cannot be used: {error}") from error
+    return FreeParameter(name, start, lower, upper)
+
+
+def _observations(
+    vehicle: Vehicle,
+    runs: Sequence[Run],
+    noise: Mapping[str, float],
+    outputs: Sequence[str] | Mapping[str, Sequence[str]] | None,
+    settings: RimsSettings,
+) -> tuple[Observation, ...]:
+    if not runs:
+        raise ProblemError("No run is given; give at least one recording.")
+    names = _distinct_names(runs)
+    if isinstance(outputs, Mapping):
+        strangers = [name for name in outputs if name not in names]
+        if strangers:
+            raise ProblemError(
+                f'Channels are chosen for a run "{strangers[0]}", but the runs are '
+                f"{', '.join(names)}."
+            )
+    for channel, deviation in noise.items():
+        if channel not in OUTPUT_CHANNELS:
+            raise ProblemError(
+                f"A noise is stated for {channel}; the compared channels are "
+                f"{', '.join(OUTPUT_CHANNELS)}."
+            )
+        if not 0.0 < deviation < math.inf:
+            raise ProblemError(f"The noise of {channel} is {deviation}; it must be positive.")
+    found = []
+    for name, run in zip(names, runs, strict=True):
+        chosen = outputs.get(name) if isinstance(outputs, Mapping) else outputs
+        measured = filtered_outputs(run, settings.output_cutoff_hz)
+        if not measured:
+            raise ProblemError(
+                f"Run {name} has none of {', '.join(OUTPUT_CHANNELS)}; at least one is needed."
+            )
+        compared = {
+            channel: measured[channel] for channel in _chosen_channels(name, measured, chosen)
+        }
+        for channel, values in compared.items():
+            if not np.all(np.isfinite(values)):
+                raise ProblemError(
+                    f"Run {name} has gaps (not a number) in {channel}; leave the channel out."
+                )
+        stated = {**DEFAULT_NOISE, **run.noise, **noise}
+        found.append(
+            Observation(
+                name,
+                prepare(run, vehicle, settings),
+                compared,
+                {channel: float(stated[channel]) for channel in compared},
+            )
+        )
+    return tuple(found)
+
+
+def _distinct_names(runs: Sequence[Run]) -> list[str]:
+    """The runs' names, numbered where two runs share one; the same data twice is refused."""
+    names: list[str] = []
+    for k, run in enumerate(runs):
+        for earlier in runs[:k]:
+            if _same_data(run, earlier):
+                raise ProblemError(
+                    f"Run {run.name} is the same recording as {earlier.name}; list it once."
+                )
+        alike = sum(run.name == earlier.name for earlier in runs[:k])
+        names.append(f"{run.name} ({alike + 1})" if alike else run.name)
+    return names
+
+
+def _same_data(one: Run, other: Run) -> bool:
+    return (
+        len(one.time) == len(other.time)
+        and set(one.channels) == set(other.channels)
+        and all(np.array_equal(one[name], other[name]) for name in one.channels)
+    )
+
+
+def _chosen_channels(
+    run_name: str, measured: Mapping[str, Array], chosen: Sequence[str] | None
+) -> list[str]:
+    if chosen is None:
+        return list(measured)
+    if not chosen:
+        raise ProblemError(f"No channel is chosen for run {run_name}; choose at least one.")
+    for channel in chosen:
+        if channel not in OUTPUT_CHANNELS:
+            raise ProblemError(
+                f"{channel} cannot be compared; choose from {', '.join(OUTPUT_CHANNELS)}."
+            )
+        if channel not in measured:
+            raise ProblemError(f"Run {run_name} has no {channel}; it has {', '.join(measured)}.")
+    return [channel for channel in OUTPUT_CHANNELS if channel in chosen]

@@ -1,0 +1,149 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from ridetune.engine.channels import Run
+from ridetune.engine.errors import MeasurementError, ParameterError, ProblemError
+from ridetune.engine.parameters import PARAMETER_NAMES
+from ridetune.engine.problem import DEFAULT_NOISE, FreeParameter, Problem
+from ridetune.engine.rims import INPUT_CHANNELS, OUTPUT_CHANNELS
+
+from ..factories import paper_vehicle
+
+CAR = paper_vehicle()
+SPRING, BAR, PIVOT = PARAMETER_NAMES[0], PARAMETER_NAMES[4], PARAMETER_NAMES[8]
+
+
+def recording(name="lap", outputs=OUTPUT_CHANNELS, seed=0, **others):
+    time = np.linspace(0.0, 2.0, 401)
+    rng = np.random.default_rng(seed)
+    channels = dict.fromkeys(INPUT_CHANNELS, np.zeros_like(time))
+    channels |= {channel: 0.01 * rng.normal(size=401) for channel in outputs}
+    return Run(name, time, channels, **others)
+
+
+def refused(*arguments, **named):
+    with pytest.raises((ProblemError, ParameterError, MeasurementError)) as raised:
+        Problem.build(*arguments, **named)
+    return str(raised.value)
+
+
+def test_without_further_words_all_twelve_are_free_between_default_bounds():
+    problem = Problem.build(CAR, [recording()])
+    assert tuple(one.name for one in problem.free) == PARAMETER_NAMES
+    assert problem.free[0] == FreeParameter(SPRING, 24000.0, 0.05 * 24000.0, 8.0 * 24000.0)
+    assert problem.observations[0].noise == DEFAULT_NOISE
+
+
+def test_free_and_fixed_take_names_and_symbols():
+    problem = Problem.build(CAR, [recording()], free=["K_F", "rear.pivot.angle"])
+    assert [one.name for one in problem.free] == [SPRING, "rear.pivot.angle"]
+    held = Problem.build(CAR, [recording()], fixed=["Ctor_F", "Ctor_R"])
+    assert len(held.free) == 10
+
+
+def test_start_values_become_the_car():
+    problem = Problem.build(CAR, [recording()], fixed=[BAR], start={BAR: 0.0, "K_F": 30000.0})
+    assert problem.vehicle.value(BAR) == 0.0
+    assert problem.free[0].start == 30000.0
+
+
+def test_a_caller_s_noise_goes_before_the_run_s_and_that_before_the_default():
+    run = recording(noise={"chassis.z": 2e-3, "chassis.roll": 1e-3})
+    problem = Problem.build(CAR, [run], noise={"chassis.z": 3e-3})
+    assert problem.observations[0].noise == {
+        "chassis.z": 3e-3,
+        "chassis.pitch": DEFAULT_NOISE["chassis.pitch"],
+        "chassis.roll": 1e-3,
+    }
+
+
+def test_channels_compared_can_be_chosen_for_all_runs_or_by_run():
+    runs = [recording("a"), recording("b", seed=1)]
+    everywhere = Problem.build(CAR, runs, outputs=["chassis.roll", "chassis.z"])
+    assert [list(seen.measured) for seen in everywhere.observations] == [
+        ["chassis.z", "chassis.roll"]
+    ] * 2
+    by_run = Problem.build(CAR, runs, outputs={"b": ["chassis.pitch"]})
+    assert [list(seen.measured) for seen in by_run.observations] == [
+        list(OUTPUT_CHANNELS),
+        ["chassis.pitch"],
+    ]
+
+
+def test_runs_may_lack_output_channels():
+    problem = Problem.build(CAR, [recording("a", ["chassis.z"]), recording("b", seed=1)])
+    assert list(problem.observations[0].measured) == ["chassis.z"]
+
+
+def test_two_recordings_of_one_name_are_told_apart():
+    problem = Problem.build(CAR, [recording(seed=0), recording(seed=1)])
+    assert [seen.name for seen in problem.observations] == ["lap", "lap (2)"]
+
+
+@pytest.mark.parametrize(
+    ("named", "sentence"),
+    [
+        ({"free": []}, "No parameter is free"),
+        ({"free": [SPRING], "fixed": [SPRING]}, "both as free and as fixed"),
+        ({"fixed": PARAMETER_NAMES}, "No parameter is free"),
+        ({"free": [SPRING, "K_F"]}, "listed twice"),
+        ({"free": ["front.suspension.stifness"]}, "did you mean front.suspension.stiffness"),
+        ({"bounds": {SPRING: (3e4, 1e4)}}, "crossed"),
+        ({"bounds": {SPRING: (2e4, 2e4)}}, "leave no room"),
+        ({"bounds": {SPRING: (3e4, 4e4)}}, "outside its bounds"),
+        ({"bounds": {SPRING: (1e4, math.inf)}}, "finite"),
+        ({"bounds": {SPRING: (1.0, 1e5)}}, "A bound of front.suspension.stiffness"),
+        ({"bounds": {PIVOT: (-2.0, 2.0)}}, "span zero"),
+        ({"start": {SPRING: -5.0}}, "A start value cannot be used"),
+        ({"start": {BAR: 0.0}}, "no default bounds follow"),
+        ({"noise": {"chassis.z": 0.0}}, "must be positive"),
+        ({"noise": {"wheel.fl.z": 1e-3}}, "compared channels"),
+        ({"outputs": ["chassis.a_x"]}, "cannot be compared"),
+        ({"outputs": []}, "choose at least one"),
+        ({"outputs": {"another": ["chassis.z"]}}, "the runs are lap"),
+        ({"traction": "none"}, 'can be "exact" or "paper"'),
+    ],
+)
+def test_what_a_caller_can_mend_is_said_in_one_sentence(named, sentence):
+    assert sentence in refused(CAR, [recording()], **named)
+
+
+def test_runs_that_cannot_be_used_are_refused():
+    assert "No run" in refused(CAR, [])
+    assert "same recording" in refused(CAR, [recording(), replace(recording(), name="copy")])
+    assert "none of chassis.z" in refused(CAR, [recording(outputs=[])])
+    assert "has no chassis.roll" in refused(
+        CAR, [recording(outputs=["chassis.z"])], outputs=["chassis.roll"]
+    )
+    gaps = recording()
+    gaps["chassis.z"][7] = math.nan
+    assert "gaps" in refused(CAR, [gaps])
+
+
+def test_fewer_samples_than_parameters_are_refused():
+    time = np.linspace(0.0, 1.0, 10)
+    channels = dict.fromkeys([*INPUT_CHANNELS, "chassis.z"], np.zeros_like(time))
+    assert "10 samples cannot determine 12" in refused(CAR, [Run("short", time, channels)])
+
+
+@pytest.mark.parametrize(
+    ("parameter", "logarithmic"),
+    [
+        (FreeParameter(SPRING, 24000.0, 1200.0, 192000.0), True),
+        (FreeParameter(PIVOT, -1.6, -10.0, -0.1), True),
+        (FreeParameter(BAR, 500.0, 0.0, 1000.0), False),
+        (FreeParameter("front.pivot.angle", 0.1, 0.01, 1.3), False),
+    ],
+)
+def test_the_optimiser_s_variable_and_the_value_are_inverse(parameter, logarithmic):
+    """Oracle: value(variable(p)) = p, and the slope by central differences."""
+    assert parameter.logarithmic == logarithmic
+    for value in np.linspace(parameter.lower, parameter.upper, 7):
+        variable = parameter.variable(value) if value or not logarithmic else 0.0
+        assert parameter.value(variable) == pytest.approx(value, rel=1e-12, abs=1e-300)
+    middle = 0.5 * (parameter.lower + parameter.upper)
+    x, step = parameter.variable(middle), 1e-5
+    slope = (parameter.value(x + step) - parameter.value(x - step)) / (2 * step)
+    assert parameter.slope(x) == pytest.approx(slope, rel=1e-8)
