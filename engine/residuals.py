@@ -1,0 +1,210 @@
+"""Residuals of an identification problem and their derivatives.
+
+The optimiser's variable is x = log |p / s| for stiffness, damping and pivot distance p of scale s,
+x = p / s for angles and for bounds at or across zero (FreeParameter): a step of 1 is about 100 %
+everywhere, and the narrow valley along which a bar's effect K_tor / d^2 stays the same, curved
+in (K_tor, d), is straight in their logarithms. Over all runs and compared channels
+
+    r(x) = (model(x) - measured) / noise,
+
+and J = dr/dx by differences of second order from ONE batch of 2 n perturbed cars a run:
+
+    r'(x) = (r(x + a) b^2 - r(x + b) a^2 - r(x) (b^2 - a^2)) / (a b (b - a)),
+
+with a, b = +h, -h, or both to the same side where a bound is nearer than h. h = 1e-4: the error of
+the formula is of order h^2 = 1e-8 of J, that of rounding (1e-16 m in z against a noise of
+0.5 mm) about 1e-13 / h = 1e-9.
+
+A car that leaves the model's range gives FAILED_TRIAL in every residual: finite, so that the trust
+region shrinks and the search goes on.
+"""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import Cancelled
+from .filters import smoothed
+from .problem import Problem
+from .rims import OUTPUT_CHANNELS, RimsInputs
+from .simulation import Traction
+from .vehicle import Vehicle
+
+Array = NDArray[np.float64]
+Simulate = Callable[[list[Vehicle], RimsInputs, Traction], Array]
+"""(cars, inputs, traction) -> (cars, samples, 3); a failed car is not a number throughout."""
+
+DIFFERENCE = 1e-4
+"""Step h of the differences of x."""
+
+FAILED_TRIAL = 1e8
+"""Residual of a failed car, in units of the noise."""
+
+CAR_STEPS_AT_ONCE = 400_000
+"""Cars times steps in one batch: 16 numbers each, about 50 MB."""
+
+LANES = 8
+"""Cars the simulation works on side by side; a batch is cut at multiples of it."""
+
+RUNS_AT_ONCE = 2
+"""Batches of different runs under way together: one fills the cores when another ends."""
+
+LOOK_EVERY = 0.05
+"""Seconds between two looks at `cancelled`; a batch under way then ends unseen."""
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """One run's channel in the residual vector.
+
+    place : where in the vector
+    measured : (samples,) SI
+    noise : standard deviation, SI
+    """
+
+    run: str
+    channel: str
+    place: slice
+    measured: Array
+    noise: float
+
+
+class Residuals:
+    """Residual vector and Jacobian of a problem, with a count of the simulations behind them.
+
+    simulate : the rims mode for a batch of cars
+    cancelled : polled every LOOK_EVERY seconds; true raises Cancelled
+    """
+
+    def __init__(
+        self, problem: Problem, simulate: Simulate, cancelled: Callable[[], bool] | None = None
+    ):
+        self.problem = problem
+        ends = [sorted(map(one.variable, (one.lower, one.upper))) for one in problem.free]
+        self.lower, self.upper = np.array(ends).T
+        self.simulations = 0
+        self._simulate = simulate
+        self._cancelled = cancelled
+        self._last: tuple[Array, Array] | None = None
+
+    def blocks(self) -> list[Block]:
+        """The blocks of the residual vector, in order."""
+        found, begin = [], 0
+        for seen in self.problem.observations:
+            for channel, measured in seen.measured.items():
+                place = slice(begin, begin + len(measured))
+                found.append(Block(seen.name, channel, place, measured, seen.noise[channel]))
+                begin += len(measured)
+        return found
+
+    def model(self, x: Array) -> dict[str, dict[str, Array]]:
+        """The model's histories by run and channel; not a number where the car fails."""
+        r = self.vector(x)
+        r = np.where(r == FAILED_TRIAL, np.nan, r)
+        histories: dict[str, dict[str, Array]] = {}
+        for block in self.blocks():
+            history = block.measured + block.noise * r[block.place]
+            histories.setdefault(block.run, {})[block.channel] = history
+        return histories
+
+    def vector(self, x: Array) -> Array:
+        """r(x), (samples of all blocks,)."""
+        if self._last is None or not np.array_equal(self._last[0], x):
+            rows = self._batch([x])
+            self._last = (x.copy(), np.where(np.isfinite(rows[0]), rows[0], FAILED_TRIAL))
+        return self._last[1]
+
+    def squares(self, trials: Sequence[Array]) -> Array:
+        """Sum of squared residuals at each of many points, infinite where the car fails."""
+        rows = self._batch(trials)
+        return np.nan_to_num(np.einsum("ij,ij->i", rows, rows), nan=np.inf)
+
+    def scatter(self) -> float:
+        """Sum of squared residuals of a model that stays at each channel's mean."""
+        return sum(
+            float(np.sum(((block.measured - np.mean(block.measured)) / block.noise) ** 2))
+            for block in self.blocks()
+        )
+
+    def jacobian(self, x: Array) -> Array:
+        """dr/dx, (samples of all blocks, parameters).
+
+        Where one of the two cars of a parameter fails, the other serves with a difference of first
+        order; where both fail the column is zero, which makes the parameter undetermined.
+        """
+        centre = self.vector(x)
+        n = len(x)
+        first = np.where(x + DIFFERENCE <= self.upper, DIFFERENCE, -2.0 * DIFFERENCE)
+        second = np.where(x - DIFFERENCE >= self.lower, -DIFFERENCE, 2.0 * DIFFERENCE)
+        steps = np.concatenate([first, second])
+        trials = x + np.tile(np.eye(n), (2, 1)) * steps[:, np.newaxis]
+        rows = self._batch(list(trials))
+        columns = np.zeros((len(centre), n))
+        for k, (a, b) in enumerate(zip(first, second, strict=True)):
+            fine = [bool(np.isfinite(rows[car]).all()) for car in (k, n + k)]
+            if all(fine):
+                weighted = rows[k] * b**2 - rows[n + k] * a**2 - centre * (b**2 - a**2)
+                columns[:, k] = weighted / (a * b * (b - a))
+            elif any(fine):
+                row, step = (rows[k], a) if fine[0] else (rows[n + k], b)
+                columns[:, k] = (row - centre) / step
+        return columns
+
+    def _batch(self, trials: Sequence[Array]) -> Array:
+        """Residuals of many cars, (cars, samples of all blocks); a failed car is not a number."""
+        vehicles = [self.problem.vehicle_at(x) for x in trials]
+        rows = []
+        for seen, histories in zip(
+            self.problem.observations, self._histories(vehicles), strict=True
+        ):
+            filtered = self._filtered(seen.inputs.time, histories)
+            for channel, measured in seen.measured.items():
+                model = filtered[:, :, OUTPUT_CHANNELS.index(channel)]
+                rows.append((model - measured) / seen.noise[channel])
+        joined = np.concatenate(rows, axis=1)
+        joined[~np.isfinite(joined).all(axis=1)] = np.nan
+        return joined
+
+    def _histories(self, vehicles: list[Vehicle]) -> list[Array]:
+        """(cars, samples, 3) for every run; the runs side by side, looking at `cancelled`."""
+        pool = ThreadPoolExecutor(RUNS_AT_ONCE)
+        try:
+            parts = [
+                [
+                    pool.submit(self._simulate, some, seen.inputs, self.problem.traction)
+                    for some in _parts(vehicles, len(seen.inputs.node_time))
+                ]
+                for seen in self.problem.observations
+            ]
+            pending = {future for run in parts for future in run}
+            while pending:
+                self._stop_if_cancelled()
+                pending = wait(pending, LOOK_EVERY).not_done
+            self.simulations += len(vehicles) * len(parts)
+            return [np.concatenate([future.result() for future in run]) for run in parts]
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+    def _filtered(self, time: Array, histories: Array) -> Array:
+        """Histories (cars, samples, 3) through the output filter; a failed car stays as it is."""
+        cutoff = self.problem.settings.output_cutoff_hz
+        if cutoff is None:
+            return histories
+        columns = np.nan_to_num(histories).transpose(1, 0, 2).reshape(len(time), -1)
+        filtered = smoothed(time, columns, cutoff).reshape(len(time), len(histories), -1)
+        return np.where(np.isfinite(histories), filtered.transpose(1, 0, 2), np.nan)
+
+    def _stop_if_cancelled(self) -> None:
+        if self._cancelled is not None and self._cancelled():
+            raise Cancelled(
+                f"The identification was cancelled after {self.simulations} simulations."
+            )
+
+
+def _parts(vehicles: list[Vehicle], nodes: int) -> list[list[Vehicle]]:
+    """The cars in batches that keep memory flat on long runs."""
+    at_once = LANES * max(1, CAR_STEPS_AT_ONCE // (LANES * nodes))
+    return [vehicles[k : k + at_once] for k in range(0, len(vehicles), at_once)]
