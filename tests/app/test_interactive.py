@@ -1,0 +1,77 @@
+"""The pool for interactive simulations: as wide as told, fair, and it refuses what piles up."""
+
+import asyncio
+import threading
+
+import pytest
+from ridetune.app.errors import Busy, Unavailable
+from ridetune.app.interactive import Interactive
+from ridetune.app.settings import Limits
+
+
+def test_no_more_runs_at_once_than_the_pool_is_wide():
+    """Each job waits at a barrier of two: three at once would break it, fewer would hang."""
+    pool = Interactive(Limits(), width=2)
+    lock, now, most = threading.Lock(), [0], [0]
+    barrier = threading.Barrier(2, timeout=10)
+
+    def work() -> None:
+        with lock:
+            now[0] += 1
+            most[0] = max(most[0], now[0])
+        barrier.wait()
+        with lock:
+            now[0] -= 1
+
+    async def run() -> None:
+        await asyncio.gather(*(pool.run(f"session {k}", work) for k in range(8)))
+
+    asyncio.run(run())
+    pool.close()
+    assert most == [2]
+
+
+def test_a_session_over_its_share_is_refused_and_free_again_afterwards():
+    pool = Interactive(Limits(session_simulations=2), width=1)
+    go = threading.Event()
+
+    async def run() -> list:
+        first = [asyncio.create_task(pool.run("greedy", lambda: go.wait(10))) for _ in range(2)]
+        await asyncio.sleep(0)
+        with pytest.raises(Busy) as refused:
+            await pool.run("greedy", lambda: None)
+        assert refused.value.headers == {"Retry-After": "1"}
+        modest = asyncio.create_task(pool.run("modest", lambda: "served"))
+        go.set()
+        return [await modest, *await asyncio.gather(*first), await pool.run("greedy", lambda: 1)]
+
+    assert asyncio.run(run()) == ["served", True, True, 1]
+    pool.close()
+
+
+def test_a_full_queue_is_refused_at_once():
+    pool = Interactive(Limits(waiting_simulations=1), width=1)
+    go = threading.Event()
+
+    async def run() -> None:
+        first = asyncio.create_task(pool.run("one", lambda: go.wait(10)))
+        await asyncio.sleep(0)
+        with pytest.raises(Unavailable):
+            await pool.run("two", lambda: None)
+        go.set()
+        await first
+
+    asyncio.run(run())
+    pool.close()
+
+
+def test_an_error_goes_to_its_caller_and_frees_the_place():
+    pool = Interactive(Limits(session_simulations=1), width=1)
+
+    async def run() -> None:
+        for _ in range(3):
+            with pytest.raises(ZeroDivisionError):
+                await pool.run("session", lambda: 1 / 0)
+
+    asyncio.run(run())
+    pool.close()
