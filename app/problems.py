@@ -1,0 +1,93 @@
+"""Errors as the web sees them: RFC 9457 problem details, one sentence each, no echo of the input.
+
+An unknown exception stays a loud 500: logged with its traceback, answered without it.
+"""
+
+import logging
+from collections.abc import Mapping
+from http import HTTPStatus
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from starlette.exceptions import HTTPException
+
+from ..engine.errors import RideError
+from .errors import ServiceError
+
+log = logging.getLogger(__name__)
+
+MEDIA_TYPE = "application/problem+json"
+
+
+def problem(
+    status: int,
+    code: str,
+    detail: str,
+    *,
+    field: str | None = None,
+    headers: Mapping[str, str] | None = None,
+) -> JSONResponse:
+    """Reply with problem details."""
+    body = {
+        "type": "about:blank",
+        "title": HTTPStatus(status).phrase,
+        "status": status,
+        "detail": detail,
+        "code": code,
+    }
+    if field:
+        body["field"] = field
+    return JSONResponse(body, status, headers=headers, media_type=MEDIA_TYPE)
+
+
+def reply_to(error: RideError) -> JSONResponse:
+    """Problem details of an error that the caller can mend."""
+    if isinstance(error, ServiceError):
+        return problem(error.status, error.code, str(error), headers=error.headers)
+    return problem(422, error.code, str(error))
+
+
+def reply_to_errors(app: FastAPI) -> None:
+    """Answer every error of every route with problem details."""
+
+    @app.exception_handler(RideError)
+    async def ride_error(_: Request, error: RideError) -> JSONResponse:
+        return reply_to(error)
+
+    @app.exception_handler(RequestValidationError)
+    async def invalid_request(_: Request, error: RequestValidationError) -> JSONResponse:
+        field, detail = _first_complaint(error)
+        return problem(422, "invalid-request", detail, field=field)
+
+    @app.exception_handler(HTTPException)
+    async def http_error(_: Request, error: HTTPException) -> JSONResponse:
+        code = HTTPStatus(error.status_code).phrase.lower().replace(" ", "-")
+        detail = str(error.detail).rstrip(".") + "."
+        if error.status_code == 404:
+            detail = "There is nothing at this address; see /api/openapi.json for what there is."
+        if error.status_code == 405:
+            detail = "This address does not take that method; see /api/openapi.json."
+        return problem(error.status_code, code, detail, headers=error.headers)
+
+    @app.exception_handler(Exception)
+    async def unexpected(request: Request, error: Exception) -> JSONResponse:
+        log.error("unexpected error in %s %s", request.method, request.url.path, exc_info=error)
+        return problem(500, "internal", "The service failed here; its log has the details.")
+
+
+def _first_complaint(error: RequestValidationError) -> tuple[str, str]:
+    complaints = error.errors()
+    first = complaints[0]
+    if first["type"] == "json_invalid":
+        return (
+            "body",
+            f"The body is not JSON: {first['ctx']['error']} at character {first['loc'][-1]}.",
+        )
+    place = ".".join(str(part) for part in first["loc"] if part != "body")[:120] or "body"
+    said = {
+        "missing": "is missing",
+        "extra_forbidden": "is not known here; check its spelling or leave it out",
+    }.get(first["type"], f"is refused: {first['msg'][:1].lower()}{first['msg'][1:200]}")
+    more = f" ({len(complaints) - 1} more like this.)" if len(complaints) > 1 else ""
+    return place, f"The field {place} {said}.{more}"
