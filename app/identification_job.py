@@ -1,0 +1,84 @@
+"""Identification as a background job: what goes to the worker, and what the worker does.
+
+The worker gets everything by value (vehicle, recordings, options), so it needs neither the
+database nor the data directory and may be another machine.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from ..engine.channels import Run
+from .errors import OverBudget
+from .job_store import Job
+from .jobs import Kind
+from .recordings import Recordings
+from .settings import Limits
+from .store import Measurement, Store
+from .worker import Report
+
+KIND = "identification"
+FINEST_STEP = 0.005
+
+
+def identification(store: Store, recordings: Recordings) -> Kind:
+    """The job kind, bound to where its recordings are kept."""
+
+    def payload(job: Job) -> dict[str, Any]:
+        kept = [store.measurement(job.session, run["id"]) for run in job.spec["runs"]]
+        return {**job.spec, "runs": [recordings.run(measurement) for measurement in kept]}
+
+    return Kind(task=identify_runs, payload=payload)
+
+
+def build_problem(spec: Mapping[str, Any], runs: list[Run]) -> Any:
+    """The engine's problem; raises what a person can mend."""
+    from ..engine.problem import Problem
+    from ..engine.vehicle_file import vehicle_from_json
+
+    return Problem.build(
+        vehicle_from_json(spec["vehicle"]),
+        runs,
+        free=spec["free"],
+        fixed=spec["fixed"],
+        bounds={name: (lower, upper) for name, (lower, upper) in spec["bounds"].items()},
+        start=spec["start"],
+        noise=spec["noise"],
+        traction=spec["traction"],
+    )
+
+
+def identify_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -> dict[str, Any]:
+    """On the worker: fit, reporting after every evaluation; the fit as JSON."""
+    from ..engine.fit_file import fit_to_json
+    from ..engine.identification import identify
+
+    costs: list[float] = []
+
+    def progress(now: Any) -> None:
+        costs.append(now.cost)
+        report(
+            {
+                "cost": now.cost,
+                "cost_history": list(costs),
+                "simulations": now.simulations,
+                "evaluations": now.evaluations,
+                "parameters": dict(now.parameters),
+                "fit_percent": {run: dict(of) for run, of in now.fit_percent.items()},
+            }
+        )
+
+    fit = identify(build_problem(payload, payload["runs"]), progress=progress, cancelled=cancelled)
+    return fit_to_json(fit)
+
+
+def check_budget(measurements: list[Measurement], limits: Limits) -> None:
+    """Refuse recordings that together are longer than an identification may take."""
+    total = sum(
+        max(kept.summary["samples"], kept.summary["duration"] / FINEST_STEP)
+        for kept in measurements
+    )
+    if total > limits.identified_samples:
+        raise OverBudget(
+            f"The runs have {total:.0f} samples together, an identification takes at most "
+            f"{limits.identified_samples}; choose fewer or shorter runs."
+        )
