@@ -1,0 +1,131 @@
+"""The web application: routes, services and the order in which they start and stop."""
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager
+from importlib.metadata import version
+from importlib.util import find_spec
+
+from fastapi import FastAPI
+from fastapi.staticfiles import StaticFiles
+
+from . import (
+    routes_catalogue,
+    routes_identifications,
+    routes_measurements,
+    routes_page,
+    routes_sessions,
+    routes_simulations,
+)
+from .cluster import Cluster
+from .guard import Guard
+from .identification_job import KIND, identification
+from .interactive import Interactive
+from .jobs import Jobs
+from .package_files import package_folder
+from .problems import reply_to_errors
+from .recordings import Recordings
+from .services import Services, Viewers
+from .settings import Settings
+from .store import Store
+from .warmup import Step, WarmUp, simulation_steps
+
+log = logging.getLogger(__name__)
+
+REAP_EVERY = 60.0
+
+
+def create_app(
+    settings: Settings,
+    *,
+    store: Store | None = None,
+    warm_up: Callable[[], Sequence[Step]] = simulation_steps,
+) -> FastAPI:
+    """The service; its data directory is locked from here or from start-up until it stops."""
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        services = _services(settings, store, warm_up)
+        app.state.services = services
+        services.warmup.start()
+        services.jobs.start(asyncio.get_running_loop())
+        reaper = asyncio.create_task(_reap(services.viewers))
+        try:
+            yield
+        finally:
+            reaper.cancel()
+            await asyncio.gather(reaper, return_exceptions=True)
+            await asyncio.to_thread(_close, services)
+
+    app = FastAPI(
+        title="ridetune",
+        version=version("ridetune"),
+        summary="Tune the ride of a car from measurements.",
+        openapi_url="/api/openapi.json",
+        docs_url=None,
+        redoc_url=None,
+        lifespan=lifespan,
+    )
+    for part in (
+        routes_catalogue,
+        routes_sessions,
+        routes_simulations,
+        routes_measurements,
+        routes_identifications,
+        routes_page,
+    ):
+        app.include_router(part.router)
+    if find_spec(".viewer", __package__):
+        from .viewer import router
+
+        app.include_router(router)
+    app.mount("/static", StaticFiles(directory=package_folder("static")))
+    reply_to_errors(app)
+    app.add_middleware(Guard, settings=settings)
+    return app
+
+
+def _services(
+    settings: Settings, store: Store | None, warm_up: Callable[[], Sequence[Step]]
+) -> Services:
+    store = store or Store(settings.data, settings.limits)
+    recordings = Recordings(store)
+    return Services(
+        settings=settings,
+        store=store,
+        recordings=recordings,
+        interactive=Interactive(settings.limits),
+        parsing=asyncio.Semaphore(1),
+        jobs=Jobs(
+            store,
+            Cluster(settings.cluster, store.directory.scratch),
+            {KIND: identification(store, recordings)},
+        ),
+        warmup=WarmUp(warm_up),
+        viewers=_viewers(),
+    )
+
+
+def _viewers() -> Viewers | None:
+    if not find_spec(".viewer", __package__):
+        return None
+    from .viewer import Viewers as Scenes
+
+    return Scenes()
+
+
+def _close(services: Services) -> None:
+    services.interactive.close()
+    services.jobs.close()
+    if services.viewers is not None:
+        services.viewers.close()
+    services.store.close()
+
+
+async def _reap(viewers: Viewers | None) -> None:
+    while viewers is not None:
+        await asyncio.sleep(REAP_EVERY)
+        with contextlib.suppress(Exception):
+            await asyncio.to_thread(viewers.reap)

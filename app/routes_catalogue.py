@@ -1,0 +1,100 @@
+"""What comes with the service and is the same for everybody: tables, cars, manoeuvres, roads.
+
+Manoeuvres and roads bring scipy with them, which takes longer to import than the rest of the
+service to start; they are imported when they are first asked for.
+"""
+
+from dataclasses import asdict
+from typing import Any, get_args
+
+import numpy as np
+from fastapi import APIRouter
+
+from ..engine.channels import CHANNELS
+from ..engine.parameters import PARAMETERS
+from ..engine.vehicle_file import reference_vehicles, vehicle_to_json
+from .errors import NotFound
+from .schemas import RoadPreview
+from .strict_json import StrictRoute
+
+router = APIRouter(prefix="/api", tags=["catalogue"], route_class=StrictRoute)
+
+
+@router.get("/parameters")
+def parameters() -> list[dict[str, Any]]:
+    """The twelve parameters of an identification and their sliders, SI."""
+    return [asdict(parameter) for parameter in PARAMETERS]
+
+
+@router.get("/channels")
+def channels() -> list[dict[str, Any]]:
+    """Every channel: name, SI unit, and how a page shows it."""
+    shown = ("name", "label", "quantity", "unit", "display_unit", "display_factor", "sign")
+    return [{key: getattr(info, key) for key in shown} for info in CHANNELS.values()]
+
+
+@router.get("/vehicles")
+def vehicles() -> list[dict[str, str]]:
+    """The reference cars."""
+    return [
+        {"key": key, "name": vehicle.name, "source": getattr(vehicle, "source", "")}
+        for key, vehicle in reference_vehicles().items()
+    ]
+
+
+@router.get("/vehicles/{key}")
+def vehicle(key: str) -> dict[str, Any]:
+    """One reference car."""
+    known = reference_vehicles()
+    if key not in known:
+        raise NotFound(f"There is no reference car by that key; there are {', '.join(known)}.")
+    return vehicle_to_json(known[key])
+
+
+@router.get("/manoeuvres")
+def manoeuvres() -> list[dict[str, Any]]:
+    """The manoeuvres that come with the service."""
+    from ..engine.manoeuvre import reference_manoeuvres
+
+    shown = ("name", "kind", "description", "duration")
+    return [
+        {"key": key, **{field: getattr(manoeuvre, field) for field in shown}}
+        for key, manoeuvre in reference_manoeuvres().items()
+    ]
+
+
+@router.get("/manoeuvres/{key}")
+def manoeuvre(key: str) -> dict[str, Any]:
+    """One manoeuvre as data, to change and send back with a simulation."""
+    from ..engine.manoeuvre import manoeuvre_to_json
+    from .simulate import known_manoeuvre
+
+    return manoeuvre_to_json(known_manoeuvre(key))
+
+
+@router.get("/roads")
+def roads() -> dict[str, Any]:
+    """What a road can be made of."""
+    from ..engine.iso8608 import Coherence
+    from ..engine.road_specs import RoadClass, RoadSpec
+
+    return {
+        "kinds": [kind.kind for kind in get_args(RoadSpec)],
+        "classes": list(get_args(RoadClass)),
+        "coherence": list(get_args(Coherence)),
+    }
+
+
+@router.post("/roads/preview")
+def preview(request: RoadPreview) -> dict[str, list[float]]:
+    """Both tracks of a road, sampled evenly."""
+    from ..engine.road_specs import Place, road_spec_from_json
+
+    spec = road_spec_from_json(request.road)
+    road = spec.build(Place(0.0, request.torque_end, request.length), request.seed)
+    x = np.linspace(0.0, request.length, request.points)
+    return {
+        "x": x.tolist(),
+        "left": road.height(0, x).tolist(),
+        "right": road.height(1, x).tolist(),
+    }

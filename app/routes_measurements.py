@@ -1,0 +1,102 @@
+"""Measurements: upload, list, look at, take back byte for byte, delete."""
+
+from datetime import UTC, datetime
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Request, Response
+from fastapi.responses import FileResponse
+from starlette.concurrency import run_in_threadpool
+
+from . import frames
+from .access import SessionId
+from .recordings import parse, summary
+from .routes_simulations import FORMS, csv_reply, frames_reply
+from .services import Services, Shared
+from .store import Measurement, NewMeasurement
+from .strict_json import StrictRoute
+from .uploads import OPENAPI, Received, Upload
+
+router = APIRouter(
+    prefix="/api/sessions/{sid}/measurements", tags=["measurements"], route_class=StrictRoute
+)
+
+
+def measurement_to_json(kept: Measurement) -> dict[str, Any]:
+    """A measurement as the REST interface shows it."""
+    return {
+        "id": kept.id,
+        "name": kept.name,
+        "bytes": kept.bytes,
+        "sha256": kept.sha256,
+        "created": datetime.fromtimestamp(kept.created, UTC).isoformat(),
+        "sample": kept.sample,
+        "noise": kept.noise,
+        **kept.summary,
+    }
+
+
+@router.post("", status_code=201, openapi_extra=OPENAPI)
+async def upload(sid: SessionId, services: Shared, received: Received) -> dict[str, Any]:
+    """Upload a recording: a form with the part `file`, or the bare file with ?name=."""
+    async with services.parsing:
+        kept = await run_in_threadpool(_keep, services, sid, received)
+    return measurement_to_json(kept)
+
+
+def _keep(services: Services, sid: str, received: Upload) -> Measurement:
+    data = received.read(services.settings.limits.upload_bytes)
+    run = parse(data, received.name)
+    new = NewMeasurement(received.name, data, summary(run), dict(run.noise))
+    return services.store.add_measurement(sid, new)
+
+
+@router.get("")
+def all_of_session(sid: SessionId, services: Shared) -> list[dict[str, Any]]:
+    """The session's measurements, oldest first."""
+    return [measurement_to_json(kept) for kept in services.store.measurements(sid)]
+
+
+@router.get("/{mid}")
+def one(sid: SessionId, mid: str, services: Shared) -> dict[str, Any]:
+    """One measurement: what was found in it."""
+    return measurement_to_json(services.store.measurement(sid, mid))
+
+
+@router.get("/{mid}/frames", responses=FORMS, response_class=Response)
+def histories(
+    sid: SessionId,
+    mid: str,
+    services: Shared,
+    request: Request,
+    channels: Annotated[
+        str | None, Query(max_length=10_000, description="Comma separated.")
+    ] = None,
+    max_samples: Annotated[int | None, Query(ge=2, le=2_000_000)] = None,
+    decimate: frames.Decimate = "extremes",
+) -> Response:
+    """The recording's histories in SI: binary, JSON or CSV."""
+    form = frames.form_of(request.headers.get("accept"))
+    run = services.recordings.run(services.store.measurement(sid, mid))
+    if form == "csv":
+        return csv_reply(run)
+    names = None if channels is None else [name for name in channels.split(",") if name]
+    taken = frames.take(run, names, max_samples, decimate)
+    head = {"mode": "measured", "name": run.name, "duration": run.duration}
+    return frames_reply({**head, "warnings": list(run.warnings)}, taken, form)
+
+
+@router.get("/{mid}/original", response_class=FileResponse)
+def original(sid: SessionId, mid: str, services: Shared) -> FileResponse:
+    """The uploaded file, byte for byte."""
+    kept = services.store.measurement(sid, mid)
+    return FileResponse(
+        services.store.original(kept),
+        filename=kept.name,
+        media_type="application/octet-stream",
+    )
+
+
+@router.delete("/{mid}", status_code=204)
+def delete(sid: SessionId, mid: str, services: Shared) -> None:
+    """Remove a measurement; refused while an identification reads it."""
+    services.store.delete_measurement(sid, mid)

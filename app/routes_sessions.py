@@ -1,0 +1,76 @@
+"""Sessions: one visitor's car, its baseline, measurements and identifications."""
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Body, Request, Response
+
+from ..engine.vehicle_file import vehicle_from_json, vehicle_to_json
+from .access import COOKIE, SessionId, bearer, give_session, require_service_token
+from .routes_identifications import job_to_json
+from .routes_measurements import measurement_to_json
+from .schemas import JsonObject
+from .services import Shared
+from .strict_json import StrictRoute
+
+router = APIRouter(prefix="/api/sessions", tags=["sessions"], route_class=StrictRoute)
+
+VehicleBody = Annotated[JsonObject, Body(description="A vehicle as docs/files describes it, SI.")]
+
+
+@router.post("", status_code=201)
+def create(request: Request, response: Response) -> dict[str, str]:
+    """A fresh session with the sample project; its token comes as a cookie and in the body."""
+    require_service_token(request, bearer(request))
+    sid, token = give_session(request, response)
+    return {"id": sid, "token": token}
+
+
+@router.get("/{sid}")
+def read(sid: SessionId, services: Shared) -> dict[str, Any]:
+    """Everything in the session, results of identifications apart."""
+    session = services.store.session(sid)
+    return {
+        "id": sid,
+        "vehicle": session.vehicle,
+        "baseline": session.baseline,
+        "measurements": [measurement_to_json(kept) for kept in services.store.measurements(sid)],
+        "identifications": [job_to_json(job) for job in services.jobs.of_session(sid)],
+    }
+
+
+@router.delete("/{sid}", status_code=204)
+def delete(sid: SessionId, services: Shared, response: Response) -> None:
+    """Remove the session with all it holds; what runs in it is cancelled."""
+    services.jobs.cancel_all(sid)
+    if services.viewers is not None:
+        services.viewers.stop(sid)
+    services.store.delete_session(sid)
+    response.delete_cookie(COOKIE + sid)
+
+
+@router.get("/{sid}/vehicle")
+def vehicle(sid: SessionId, services: Shared) -> dict[str, Any]:
+    """The car being tuned."""
+    return services.store.session(sid).vehicle
+
+
+@router.put("/{sid}/vehicle")
+def set_vehicle(sid: SessionId, services: Shared, body: VehicleBody) -> dict[str, Any]:
+    """Replace the car being tuned; a fit.json is taken too, for its vehicle."""
+    checked = vehicle_to_json(vehicle_from_json(body))
+    services.store.set_vehicle(sid, checked)
+    return checked
+
+
+@router.get("/{sid}/baseline")
+def baseline(sid: SessionId, services: Shared) -> dict[str, Any]:
+    """The car it is compared with."""
+    return services.store.session(sid).baseline
+
+
+@router.put("/{sid}/baseline")
+def set_baseline(sid: SessionId, services: Shared, body: VehicleBody) -> dict[str, Any]:
+    """Replace the car it is compared with."""
+    checked = vehicle_to_json(vehicle_from_json(body))
+    services.store.set_baseline(sid, checked)
+    return checked

@@ -1,0 +1,62 @@
+"""Interactive simulations of a session's car."""
+
+from typing import Any
+
+from fastapi import APIRouter, Request, Response
+from fastapi.responses import JSONResponse
+
+from . import frames
+from .access import SessionId
+from .schemas import SimulationRequest
+from .services import Services, Shared
+from .strict_json import StrictRoute
+
+router = APIRouter(
+    prefix="/api/sessions/{sid}/simulations", tags=["simulations"], route_class=StrictRoute
+)
+
+FORMS: dict[int | str, dict[str, Any]] = {
+    200: {
+        "description": "Head and histories; binary, JSON or CSV as the Accept header asks.",
+        "content": {name: {} for name in frames.MEDIA_TYPES},
+    }
+}
+
+
+@router.post("", responses=FORMS, response_class=Response)
+async def simulate(
+    sid: SessionId, services: Shared, body: SimulationRequest, request: Request
+) -> Response:
+    """Simulate a manoeuvre, a recording's wheel motion or a rig test."""
+    form = frames.form_of(request.headers.get("accept"))
+    services.warmup.require()
+    return await services.interactive.run(sid, lambda: _simulated(services, sid, body, form))
+
+
+def _simulated(
+    services: Services, sid: str, body: SimulationRequest, form: frames.Form
+) -> Response:
+    from .simulate import plan, reply
+
+    task = plan(body, sid, services.store, services.recordings, services.settings.limits)
+    found = reply(body, task)
+    if body.scene and services.viewers is not None:
+        services.viewers.show(sid, task.vehicle)
+    if form == "csv":
+        return csv_reply(found.run)
+    taken = frames.take(found.run, body.channels, body.max_samples, body.decimate)
+    return frames_reply(found.head, taken, form)
+
+
+def frames_reply(head: dict[str, Any], taken: frames.Frames, form: frames.Form) -> Response:
+    """Histories as binary or JSON."""
+    if form == "binary":
+        return Response(frames.to_binary(head, taken), media_type="application/vnd.ridetune.frames")
+    return JSONResponse(frames.to_json(head, taken))
+
+
+def csv_reply(run: Any) -> Response:
+    """A run as the measurement file it would be."""
+    from ..engine.measurement import run_to_csv
+
+    return Response(run_to_csv(run), media_type="text/csv; charset=utf-8")

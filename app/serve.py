@@ -1,0 +1,74 @@
+"""Run the service until it is told to stop."""
+
+import contextlib
+import logging
+import resource
+import socket
+
+import uvicorn
+
+from .errors import StartError
+from .main import create_app
+from .settings import Settings
+from .store import Store
+
+GRACE_SECONDS = 3
+FILES = 65_536
+WAITING = 1024
+
+
+def serve(settings: Settings) -> None:
+    """Serve; StartError with a sentence if the address or the data directory cannot be had."""
+    settings.check_bind()
+    logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
+    _allow_many_files()
+    with _listen(settings) as listener:
+        store = Store(settings.data, settings.limits)
+        host, port = listener.getsockname()[:2]
+        shown = f"[{host}]" if ":" in host else host
+        invitation = "?token=<RIDETUNE_TOKEN>" if settings.token else ""
+        print(f"ridetune serves http://{shown}:{port}/{invitation} (data in {settings.data})")
+        config = uvicorn.Config(
+            create_app(settings, store=store),
+            log_level="warning",
+            access_log=False,
+            server_header=False,
+            ws_per_message_deflate=False,
+            timeout_graceful_shutdown=GRACE_SECONDS,
+        )
+        # Ctrl-C has ended the service in good order when uvicorn passes it on.
+        with contextlib.suppress(KeyboardInterrupt):
+            uvicorn.Server(config).run(sockets=[listener])
+
+
+def _listen(settings: Settings) -> socket.socket:
+    """The listening socket, so that a port in use is a sentence and port 0 is told."""
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            settings.host, settings.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+        listener = socket.socket(family, kind, protocol)
+    except OSError as error:
+        raise _refused(settings, error) from None
+    try:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(address)
+        listener.listen(WAITING)
+    except OSError as error:
+        listener.close()
+        raise _refused(settings, error) from None
+    return listener
+
+
+def _refused(settings: Settings, error: OSError) -> StartError:
+    return StartError(
+        f"Cannot listen on {settings.host} port {settings.port} ({error.strerror}); is another "
+        "service there? Choose another with --port."
+    )
+
+
+def _allow_many_files() -> None:
+    """Each 3D tab takes several file descriptors; take what the system lets us."""
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = FILES if most == resource.RLIM_INFINITY else min(FILES, most)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))

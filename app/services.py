@@ -1,0 +1,54 @@
+"""What the handlers share, made once per service and found at `app.state.services`."""
+
+import asyncio
+from dataclasses import dataclass
+from typing import Annotated, Any, Protocol, cast
+
+from fastapi import Depends
+from starlette.requests import HTTPConnection
+
+from ..engine.vehicle import Vehicle
+from .interactive import Interactive
+from .jobs import Jobs
+from .recordings import Recordings
+from .settings import Settings
+from .store import Store
+from .warmup import WarmUp
+
+
+class Viewers(Protocol):
+    """The 3D scenes of the sessions; every method may be called from any thread."""
+
+    def show(self, sid: str, vehicle: Vehicle) -> None:
+        """Show a car in a session's scene."""
+
+    def stop(self, sid: str) -> None:
+        """End a session's scene."""
+
+    def reap(self) -> None:
+        """End the scenes nobody has watched for a while."""
+
+    def close(self) -> None:
+        """End all scenes."""
+
+
+@dataclass(frozen=True)
+class Services:
+    """One running service."""
+
+    settings: Settings
+    store: Store
+    recordings: Recordings
+    interactive: Interactive
+    parsing: asyncio.Semaphore
+    jobs: Jobs
+    warmup: WarmUp
+    viewers: Viewers | None = None
+
+
+def services_of(connection: HTTPConnection) -> Services:
+    """The services of the application that serves a request or a websocket."""
+    return cast(Any, connection.app).state.services
+
+
+Shared = Annotated[Services, Depends(services_of)]

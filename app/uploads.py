@@ -1,0 +1,75 @@
+"""An upload on its way in: a form's file or the bare body, to the bytes and a harmless name."""
+
+import re
+from collections.abc import AsyncIterator
+from tempfile import SpooledTemporaryFile
+from typing import Annotated, BinaryIO, cast
+
+from fastapi import Depends, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import UploadFile
+
+from .errors import BadRequest, TooLarge
+
+LONGEST_NAME = 100
+IN_MEMORY = 1_000_000
+
+OPENAPI = {
+    "requestBody": {
+        "required": True,
+        "content": {
+            "multipart/form-data": {
+                "schema": {
+                    "type": "object",
+                    "required": ["file"],
+                    "properties": {"file": {"type": "string", "format": "binary"}},
+                }
+            },
+            "text/csv": {"schema": {"type": "string", "format": "binary"}},
+        },
+    }
+}
+
+
+class Upload:
+    """A file that has arrived whole: its name and where to read it."""
+
+    def __init__(self, name: str, file: BinaryIO):
+        self.name = name
+        self._file = file
+
+    def read(self, limit: int) -> bytes:
+        """All bytes; TooLarge beyond the limit."""
+        self._file.seek(0)
+        data = self._file.read(limit + 1)
+        if len(data) > limit:
+            raise TooLarge(
+                f"{self.name}: the file is over the limit of {limit / 1e6:g} MB; cut it into "
+                "shorter recordings or sample it less often."
+            )
+        return data
+
+
+async def _received(request: Request, name: str = "") -> AsyncIterator[Upload]:
+    """The one file of a request; the counting of its bytes is the guard's."""
+    if request.headers.get("content-type", "").lower().startswith("multipart/form-data"):
+        async with request.form(max_files=1, max_fields=5) as form:
+            file = form.get("file")
+            if not isinstance(file, UploadFile):
+                raise BadRequest('The form has no file; send it in a part called "file".')
+            yield Upload(harmless(name or file.filename or ""), file.file)
+        return
+    with SpooledTemporaryFile(max_size=IN_MEMORY) as file:
+        async for chunk in request.stream():
+            await run_in_threadpool(file.write, chunk)
+        yield Upload(harmless(name), cast(BinaryIO, file))
+
+
+def harmless(name: str) -> str:
+    """The last part of a path, without control characters, of bounded length."""
+    last = re.split(r"[/\\]", name)[-1]
+    plain = re.sub(r"[\x00-\x1f\x7f-\x9f\ud800-\udfff]", "", last).strip(" .")
+    return plain[-LONGEST_NAME:] or "measurement.csv"
+
+
+Received = Annotated[Upload, Depends(_received)]

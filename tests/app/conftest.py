@@ -1,0 +1,97 @@
+"""A service in a temporary data directory, reached through its HTTP interface."""
+
+import csv
+import io
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+from ridetune.app.main import create_app
+from ridetune.app.settings import Limits, Settings
+
+ADDRESS = "http://127.0.0.1:8000"
+SAMPLES = Path(__file__).parents[2] / "sample_runs"
+
+
+def open_client(settings: Settings, **options) -> TestClient:
+    """A client of a fresh service that takes the kernels as compiled; enter it to start."""
+    app = create_app(settings, warm_up=lambda: ())
+    return TestClient(app, base_url=ADDRESS, **options)
+
+
+class Visitor:
+    """One session, by its bearer token; paths are relative to the session's."""
+
+    def __init__(self, client: TestClient):
+        self.client = client
+        made = client.post("/api/sessions")
+        assert made.status_code == 201
+        client.cookies.clear()
+        self.id, self.token = made.json()["id"], made.json()["token"]
+
+    def request(self, method: str, path: str, **options):
+        headers = {"Authorization": f"Bearer {self.token}"} | options.pop("headers", {})
+        return self.client.request(
+            method, f"/api/sessions/{self.id}{path}", headers=headers, **options
+        )
+
+    def get(self, path: str = "", **options):
+        return self.request("GET", path, **options)
+
+    def post(self, path: str, **options):
+        return self.request("POST", path, **options)
+
+    def put(self, path: str, **options):
+        return self.request("PUT", path, **options)
+
+    def delete(self, path: str = "", **options):
+        return self.request("DELETE", path, **options)
+
+    def upload(self, data: bytes, name: str = "run.csv"):
+        return self.post("/measurements", files={"file": (name, data)})
+
+
+@pytest.fixture
+def settings(tmp_path) -> Settings:
+    return Settings(data=tmp_path / "data")
+
+
+@pytest.fixture
+def client(settings) -> Iterator[TestClient]:
+    with open_client(settings) as client:
+        yield client
+
+
+@pytest.fixture
+def visitor(client) -> Visitor:
+    return Visitor(client)
+
+
+@pytest.fixture
+def small_limits(tmp_path) -> Settings:
+    """A service that refuses early."""
+    limits = Limits(
+        upload_bytes=20_000,
+        body_bytes=10_000,
+        sessions=2,
+        session_measurements=3,
+        session_bytes=5_000_000,
+        unfinished_jobs=1,
+        simulated_seconds=30.0,
+        simulated_steps=20_000,
+    )
+    return Settings(data=tmp_path / "small", limits=limits)
+
+
+def short_recording(samples: int = 101) -> bytes:
+    """A measurement file with all that an identification needs."""
+    names = ["time [s]", "chassis.z [mm]", "chassis.a_x [m/s^2]"]
+    names += [f"wheel.{corner}.z [mm]" for corner in ("fl", "fr", "rl", "rr")]
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(names)
+    for k in range(samples):
+        wave = [(k * (3 + column) % 17 - 8) * 0.5 for column in range(len(names) - 1)]
+        table.writerow([f"{0.01 * k:.2f}", *wave])
+    return text.getvalue().encode()

@@ -1,0 +1,101 @@
+"""What comes with the service: tables, cars, manoeuvres, roads, and the description of it all."""
+
+import math
+
+import pytest
+from ridetune.engine.channels import CHANNELS
+from ridetune.engine.manoeuvre import manoeuvre_from_json, reference_manoeuvres
+from ridetune.engine.parameters import PARAMETER_NAMES
+from ridetune.engine.vehicle_file import reference_vehicles, vehicle_from_json
+
+
+def test_the_tables_are_the_engines(client):
+    parameters = client.get("/api/parameters").json()
+    assert [row["name"] for row in parameters] == list(PARAMETER_NAMES)
+    assert all(row["slider_lower"] < row["slider_upper"] for row in parameters)
+    channels = client.get("/api/channels").json()
+    assert [row["name"] for row in channels] == list(CHANNELS)
+    pitch = next(row for row in channels if row["name"] == "chassis.pitch")
+    assert (pitch["unit"], pitch["display_unit"]) == ("rad", "deg")
+    assert pitch["display_factor"] == pytest.approx(180.0 / math.pi)
+
+
+def test_every_listed_car_reads_back_as_itself(client):
+    listed = client.get("/api/vehicles").json()
+    assert [row["key"] for row in listed] == list(reference_vehicles())
+    for row in listed:
+        data = client.get(f"/api/vehicles/{row['key']}").json()
+        assert vehicle_from_json(data) == reference_vehicles()[row["key"]]
+
+
+def test_every_listed_manoeuvre_reads_back_as_itself(client):
+    listed = client.get("/api/manoeuvres").json()
+    assert [row["key"] for row in listed] == list(reference_manoeuvres())
+    for row in listed:
+        data = client.get(f"/api/manoeuvres/{row['key']}").json()
+        assert manoeuvre_from_json(data) == reference_manoeuvres()[row["key"]]
+
+
+def test_an_unknown_key_lists_the_known_ones(client):
+    for path, known in (("vehicles/lada", "paper"), ("manoeuvres/slalom", "constant-speed-c")):
+        reply = client.get(f"/api/{path}")
+        assert reply.status_code == 404
+        assert known in reply.json()["detail"]
+
+
+def test_a_road_is_previewed_as_it_will_be_driven(client):
+    asked = {"road": {"kind": "bump", "begin": 10.0, "length": 2.0, "height": 0.05}, "length": 20.0}
+    road = client.post("/api/roads/preview", json={**asked, "points": 201}).json()
+    assert (road["x"][0], road["x"][-1], len(road["x"])) == (0.0, 20.0, 201)
+    assert max(road["left"]) == pytest.approx(0.05, rel=1e-3)
+    assert road["left"] == road["right"]
+    assert road["left"][0] == road["left"][-1] == 0.0
+
+
+def test_a_random_road_follows_its_seed(client):
+    def left(seed: int) -> list[float]:
+        road = {"kind": "iso8608", "sections": [{"class": "C"}]}
+        asked = {"road": road, "length": 50.0, "seed": seed, "points": 100}
+        return client.post("/api/roads/preview", json=asked).json()["left"]
+
+    assert left(1) == left(1)
+    assert left(1) != left(2)
+
+
+def test_what_a_road_can_be_made_of(client):
+    offered = client.get("/api/roads").json()
+    assert offered["classes"] == list("ABCDEFGH")
+    assert {"flat", "iso8608", "bump", "pothole", "sine-sweep"} == set(offered["kinds"])
+    assert {"exponential", "isotropic"} <= set(offered["coherence"])
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"road": {"kind": "cobbles"}}, "kind"),
+        ({"road": {"kind": "bump", "begin": 1, "length": 1, "heigth": 0.1}}, "height"),
+        ({"road": {"kind": "flat"}, "length": 1e9}, "length"),
+        ({}, "road"),
+    ],
+)
+def test_a_road_that_cannot_be_built_is_refused(client, asked, said):
+    reply = client.post("/api/roads/preview", json=asked)
+    assert reply.status_code == 422
+    assert said in reply.json()["detail"]
+
+
+def test_the_interface_describes_itself(client):
+    """Every resource of the interface is in the OpenAPI document, the page's own routes are not."""
+    paths = client.get("/api/openapi.json").json()["paths"]
+    session = "/api/sessions/{sid}"
+    for path in (
+        "/api/parameters",
+        "/api/sessions",
+        f"{session}/simulations",
+        f"{session}/measurements/{{mid}}/original",
+        f"{session}/identifications/{{jid}}/events",
+    ):
+        assert path in paths
+    assert "/" not in paths
+    form = paths[f"{session}/measurements"]["post"]["requestBody"]["content"]
+    assert "multipart/form-data" in form

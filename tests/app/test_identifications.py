@@ -1,0 +1,117 @@
+"""Identifications from upload to result, by the real engine on real workers, kills included."""
+
+import json
+import os
+import signal
+import time
+
+import httpx2
+import psutil
+import pytest
+from ridetune.app.settings import Settings
+from ridetune.engine.vehicle_file import read_vehicle, vehicle_to_json
+
+from .conftest import SAMPLES, Visitor, open_client
+from .live import LiveService
+
+PATIENCE = 120.0
+
+
+@pytest.fixture(scope="module")
+def engineer(tmp_path_factory):
+    """A session on a service with workers of its own."""
+    with open_client(Settings(data=tmp_path_factory.mktemp("fits"))) as client:
+        yield Visitor(client)
+
+
+def wait_for(visitor: Visitor, job: str, *states: str) -> dict:
+    deadline = time.monotonic() + PATIENCE
+    while True:
+        kept = visitor.get(f"/identifications/{job}").json()
+        if kept["state"] in states:
+            return kept
+        assert time.monotonic() < deadline, kept
+        time.sleep(0.05)
+
+
+def test_two_parameters_come_back_from_the_twins_recording(engineer):
+    """Oracle: the car the recording was simulated with; four standard errors of tolerance."""
+    truth = read_vehicle(SAMPLES / "paper_vehicle.json")
+    names = ["front.suspension.stiffness", "rear.suspension.damping"]
+    start = {name: 1.3 * truth.value(name) for name in names}
+    recording = SAMPLES / "paper_twin_1.csv"
+    run = engineer.upload(recording.read_bytes(), recording.name).json()
+    asked = {
+        "vehicle": vehicle_to_json(truth),
+        "runs": [run["id"]],
+        "free": names,
+        "start": start,
+    }
+    job = engineer.post("/identifications", json=asked).json()
+    events = engineer.get(f"/identifications/{job['id']}/events").text
+    assert events.startswith("event: state")
+    assert "event: progress" in events
+    ended = wait_for(engineer, job["id"], "done", "failed")
+    assert ended["state"] == "done", ended["error"]
+    assert ended["progress"]["cost"] == ended["progress"]["cost_history"][-1]
+    for found in ended["result"]["parameters"]:
+        assert found["start"] == start[found["name"]]
+        assert abs(found["value"] - truth.value(found["name"])) < 4.0 * found["std_error"]
+        assert found["determined"] == "yes"
+    applied = engineer.put("/vehicle", json=ended["result"])
+    assert applied.json() == ended["result"]["vehicle"]
+
+
+def test_a_running_identification_is_cancelled(engineer):
+    runs = [kept["id"] for kept in engineer.get("/measurements").json()][:2]
+    job = engineer.post("/identifications", json={"runs": runs}).json()["id"]
+    wait_for(engineer, job, "running")
+    assert engineer.post(f"/identifications/{job}/cancel").status_code == 202
+    ended = wait_for(engineer, job, "cancelled", "done", "failed")
+    assert (ended["state"], ended["error"], ended["result"]) == ("cancelled", None, None)
+
+
+def test_after_a_kill_nothing_is_left_behind_and_nothing_is_lost(tmp_path):
+    """Workers go with the service; uploads are byte-exact; acknowledged jobs run after all."""
+    recording = (SAMPLES / "paper_twin_1.csv").read_bytes()
+    with LiveService(tmp_path) as service:
+        visitor = Visitor(service.client)
+        run = visitor.upload(recording, "twin.csv").json()["id"]
+        asked = {"runs": [run], "free": ["front.suspension.stiffness"]}
+        job = visitor.post("/identifications", json=asked).json()["id"]
+        wait_for(visitor, job, "running", "done")
+        family = psutil.Process(service.process.pid).children(recursive=True)
+        assert family
+        service.kill()
+        _, alive = psutil.wait_procs(family, timeout=10)
+        assert alive == []
+    with LiveService(tmp_path) as service:
+        visitor.client = service.client
+        assert visitor.get(f"/measurements/{run}/original").content == recording
+        ended = wait_for(visitor, job, "done", "failed")
+        assert ended["state"] == "done", ended["error"]
+        assert ended["result"]["parameters"][0]["name"] == "front.suspension.stiffness"
+
+
+def test_a_live_stream_ends_with_the_client_and_the_service_stops_on_request(tmp_path):
+    """The first event comes while the job is still queued; a signal ends the service in time."""
+    with LiveService(tmp_path) as service:
+        visitor = Visitor(service.client)
+        runs = [kept["id"] for kept in visitor.get("/measurements").json()]
+        job = visitor.post("/identifications", json={"runs": runs}).json()["id"]
+        with service.client.stream(
+            "GET",
+            f"/api/sessions/{visitor.id}/identifications/{job}/events",
+            headers={"Authorization": f"Bearer {visitor.token}"},
+        ) as reply:
+            assert reply.headers["content-type"].startswith("text/event-stream")
+            lines = (line for line in reply.iter_lines() if line)
+            assert next(lines) == "event: state"
+            first = json.loads(next(lines).removeprefix("data: "))
+            assert first["id"] == job
+            assert first["state"] in ("queued", "running")
+        assert service.client.get("/healthz").json() == {"state": "running"}
+        os.kill(service.process.pid, signal.SIGINT)
+        assert service.process.wait(timeout=30) == 0
+        with pytest.raises(httpx2.ConnectError):
+            service.client.get("/healthz")

@@ -1,0 +1,327 @@
+"""Jobs as their owner sees them: states, events, cancelling; the cluster is a stand-in."""
+
+import json
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+from fastapi.testclient import TestClient
+from ridetune.app.errors import Unavailable
+
+from .conftest import Visitor, open_client
+
+PATIENCE = 20.0
+
+
+class StandIn:
+    """A cluster whose tasks do what the test says."""
+
+    def __init__(self, address: str, scratch):
+        self.tasks: dict[str, tuple] = {}
+        self.cancelled: list[str] = []
+        self.refusing = False
+
+    def submit(self, name, task, payload, listener):
+        if self.refusing:
+            raise Unavailable("The job workers cannot be reached.")
+        self.tasks[name] = (task, payload, listener)
+
+    def cancel(self, name, grace):
+        self.cancelled.append(name)
+        if name in self.tasks:
+            self.end(name, "cancelled")
+
+    def close(self):
+        self.tasks.clear()
+
+    def start(self, name: str) -> None:
+        self.tasks[name][2].task_started(name)
+
+    def report(self, name: str, **progress) -> None:
+        self.tasks[name][2].task_progressed(name, progress)
+
+    def end(self, name: str, state: str, result=None, error=None) -> None:
+        ending = {"state": state, "result": result, "error": error, "progress": {}}
+        self.tasks.pop(name)[2].task_ended(name, ending)
+
+    def lose(self, name: str) -> None:
+        self.tasks.pop(name)[2].task_lost(name)
+
+
+@pytest.fixture
+def clusters(monkeypatch) -> list[StandIn]:
+    """The stand-ins of all services of a test, the latest last."""
+    made: list[StandIn] = []
+
+    def make(address, scratch) -> StandIn:
+        made.append(StandIn(address, scratch))
+        return made[-1]
+
+    monkeypatch.setattr("ridetune.app.main.Cluster", make)
+    return made
+
+
+@pytest.fixture
+def service(settings, clusters) -> Iterator[TestClient]:
+    with open_client(settings) as client:
+        yield client
+
+
+@pytest.fixture
+def owner(service) -> Visitor:
+    return Visitor(service)
+
+
+def submit(owner: Visitor, **more) -> dict:
+    runs = [kept["id"] for kept in owner.get("/measurements").json()][:1]
+    reply = owner.post("/identifications", json={"runs": runs, **more})
+    assert reply.status_code == 202, reply.text
+    return reply.json()
+
+
+def until(condition: Callable[[], object]) -> None:
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+def state(owner: Visitor, job: str) -> str:
+    return owner.get(f"/identifications/{job}").json()["state"]
+
+
+def events(owner: Visitor, job: str) -> list[tuple[str, dict]]:
+    """All events of a job that has ended."""
+    text = owner.get(f"/identifications/{job}/events").text
+    blocks = [
+        dict(line.split(": ", 1) for line in block.splitlines() if line[0] != ":")
+        for block in text.strip().split("\n\n")
+    ]
+    return [(block["event"], json.loads(block["data"])) for block in blocks if block]
+
+
+def test_a_job_is_answered_for_before_it_runs(owner, clusters):
+    """202 with what was asked, the twelve parameters by default, nothing found yet."""
+    job = submit(owner)
+    assert (job["state"], job["kind"], len(job["free"])) == ("queued", "identification", 12)
+    assert job["runs"][0]["name"] == "detailed_manoeuvre_1.csv"
+    assert job["created"] is not None
+    assert (job["started"], job["finished"], job["error"]) == (None, None, None)
+    until(lambda: job["id"] in clusters[-1].tasks)
+    assert owner.get("/identifications").json() == [job]
+    assert owner.get().json()["identifications"] == [job]
+
+
+def test_what_goes_to_the_worker_is_everything_it_needs(owner, clusters):
+    job = submit(owner, free=["front.suspension.stiffness"], traction="paper")
+    until(lambda: job["id"] in clusters[-1].tasks)
+    _, payload, _ = clusters[-1].tasks[job["id"]]
+    assert payload["free"] == ["front.suspension.stiffness"]
+    assert payload["traction"] == "paper"
+    assert payload["vehicle"] == owner.get("/vehicle").json()
+    assert payload["runs"][0].name == "detailed_manoeuvre_1.csv"
+    assert "wheel.fl.z" in payload["runs"][0]
+
+
+def test_a_job_runs_reports_and_ends_with_its_result(owner, clusters):
+    job = submit(owner)["id"]
+    until(lambda: job in clusters[-1].tasks)
+    clusters[-1].start(job)
+    until(lambda: state(owner, job) == "running")
+    clusters[-1].report(job, cost=3.5, cost_history=[9.0, 3.5])
+    until(lambda: owner.get(f"/identifications/{job}").json()["progress"])
+    assert owner.get(f"/identifications/{job}").json()["progress"]["cost_history"] == [9.0, 3.5]
+    clusters[-1].end(job, "done", result={"cost": 1.0, "correlation": [[float("nan")]]})
+    until(lambda: state(owner, job) == "done")
+    ended = owner.get(f"/identifications/{job}").json()
+    assert ended["result"] == {"cost": 1.0, "correlation": [[None]]}
+    assert ended["finished"] >= ended["started"] >= ended["created"]
+    assert ended["progress"]["cost"] == 3.5
+    assert "result" not in owner.get("/identifications").json()[0]
+
+
+def test_the_events_end_with_the_final_state(owner, clusters):
+    """Whoever comes after the end still hears how far it came and how it ended, and no more."""
+    job = submit(owner)["id"]
+    until(lambda: job in clusters[-1].tasks)
+    clusters[-1].start(job)
+    clusters[-1].report(job, cost=2.0)
+    clusters[-1].end(job, "failed", error={"code": "identification", "detail": "Sorry."})
+    until(lambda: state(owner, job) == "failed")
+    ((event, told),) = events(owner, job)
+    assert event == "state"
+    assert told["progress"] == {"cost": 2.0}
+    assert told["error"] == {"code": "identification", "detail": "Sorry."}
+    assert "result" not in told
+
+
+def test_events_of_an_unknown_job_are_not_found(owner):
+    assert owner.get("/identifications/nothing/events").status_code == 404
+
+
+def test_followers_hear_every_change_and_leave_nothing_behind(service, owner, clusters):
+    """Straight at the service: a follower that goes away, one that stays to the end."""
+    job = submit(owner)["id"]
+    until(lambda: job in clusters[-1].tasks)
+    jobs = service.app.state.services.jobs
+
+    async def follow() -> list[str]:
+        leaver = jobs.follow(owner.id, job)
+        await anext(leaver)
+        stayer = jobs.follow(owner.id, job)
+        seen = [(await anext(stayer)).state]
+        await leaver.aclose()
+        clusters[-1].start(job)
+        while seen[-1] != "running":
+            seen.append((await anext(stayer)).state)
+        clusters[-1].end(job, "done", result={})
+        seen += [now.state async for now in stayer]
+        return seen
+
+    seen = service.portal.call(follow)
+    assert seen[0] == "queued"
+    assert "running" in seen
+    assert seen[-1] == "done"
+    assert jobs._followers == {}
+
+
+def test_a_waiting_job_is_cancelled_at_once(owner, clusters):
+    job = submit(owner)["id"]
+    assert owner.post(f"/identifications/{job}/cancel").status_code == 202
+    assert state(owner, job) == "cancelled"
+    until(lambda: job in clusters[-1].cancelled)
+
+
+def test_a_running_job_is_asked_to_stop(owner, clusters):
+    job = submit(owner)["id"]
+    until(lambda: job in clusters[-1].tasks)
+    clusters[-1].start(job)
+    until(lambda: state(owner, job) == "running")
+    assert owner.post(f"/identifications/{job}/cancel").status_code == 202
+    until(lambda: state(owner, job) == "cancelled")
+    again = owner.post(f"/identifications/{job}/cancel")
+    assert (again.status_code, again.json()["state"]) == (202, "cancelled")
+
+
+def test_the_same_key_submits_once(owner, clusters):
+    first, second = submit(owner, key="click-1"), submit(owner, key="click-1")
+    assert first["id"] == second["id"]
+    assert len(owner.get("/identifications").json()) == 1
+
+
+def test_a_lost_job_is_sent_again_but_not_for_ever(owner, clusters):
+    job = submit(owner)["id"]
+    for _ in range(3):
+        until(lambda: job in clusters[-1].tasks)
+        clusters[-1].start(job)
+        until(lambda: state(owner, job) == "running")
+        clusters[-1].lose(job)
+    until(lambda: state(owner, job) == "failed")
+    assert owner.get(f"/identifications/{job}").json()["error"]["code"] == "worker-lost"
+
+
+def test_workers_out_of_reach_fail_the_job_with_their_sentence(owner, clusters):
+    clusters[-1].refusing = True
+    job = submit(owner)["id"]
+    until(lambda: state(owner, job) == "failed")
+    error = owner.get(f"/identifications/{job}").json()["error"]
+    assert error == {"code": "unavailable", "detail": "The job workers cannot be reached."}
+
+
+def test_after_a_restart_the_unfinished_run_again_and_the_finished_stay(settings, clusters):
+    with open_client(settings) as service:
+        owner = Visitor(service)
+        waiting, running, done = (submit(owner)["id"] for _ in range(3))
+        until(lambda: len(clusters[-1].tasks) == 3)
+        clusters[-1].start(running)
+        clusters[-1].end(done, "done", result={"cost": 1.0})
+        until(lambda: state(owner, running) == "running" and state(owner, done) == "done")
+    with open_client(settings) as service:
+        owner.client = service
+        until(lambda: set(clusters[-1].tasks) == {waiting, running})
+        assert state(owner, running) == "queued"
+        assert owner.get(f"/identifications/{done}").json()["result"] == {"cost": 1.0}
+        clusters[-1].end(running, "done", result={"cost": 2.0})
+        until(lambda: state(owner, running) == "done")
+
+
+def test_a_deleted_job_is_gone_and_stopped(owner, clusters):
+    job = submit(owner)["id"]
+    until(lambda: job in clusters[-1].tasks)
+    assert owner.delete(f"/identifications/{job}").status_code == 204
+    assert owner.get(f"/identifications/{job}").status_code == 404
+    until(lambda: job in clusters[-1].cancelled)
+
+
+def test_a_deleted_session_stops_its_jobs(owner, clusters):
+    job = submit(owner)["id"]
+    until(lambda: job in clusters[-1].tasks)
+    assert owner.delete().status_code == 204
+    until(lambda: job in clusters[-1].cancelled)
+
+
+def test_a_measurement_in_use_stays_until_its_job_has_ended(owner, clusters):
+    job = submit(owner)
+    measurement = f"/measurements/{job['runs'][0]['id']}"
+    refused = owner.delete(measurement)
+    assert refused.status_code == 409
+    assert job["id"] in refused.json()["detail"]
+    owner.post(f"/identifications/{job['id']}/cancel")
+    assert owner.delete(measurement).status_code == 204
+
+
+def test_jobs_of_others_are_neither_seen_nor_stopped(service, owner, clusters):
+    job = submit(owner)["id"]
+    stranger = Visitor(service)
+    assert stranger.get("/identifications").json() == []
+    for method, path in (("GET", ""), ("GET", "/events"), ("POST", "/cancel"), ("DELETE", "")):
+        reply = stranger.request(method, f"/identifications/{job}{path}")
+        assert reply.status_code == 404
+    assert state(owner, job) == "queued"
+
+
+REFUSED = {
+    "no runs": ({"runs": []}, "identification", "run"),
+    "unknown run": ({"runs": ["nothing"]}, "not-found", "measurement"),
+    "nothing free": ({"free": []}, "identification", "free"),
+    "unknown name": ({"free": ["front.suspension.stifness"]}, "parameter", "stiffness"),
+    "crossed bounds": (
+        {"bounds": {"front.suspension.stiffness": [2e4, 1e4]}},
+        "identification",
+        "front.suspension.stiffness",
+    ),
+    "start outside": (
+        {"start": {"front.suspension.stiffness": 1e9}},
+        "identification",
+        "front.suspension.stiffness",
+    ),
+    "free and fixed": (
+        {"free": ["front.pivot.angle"], "fixed": ["front.pivot.angle"]},
+        "identification",
+        "front.pivot.angle",
+    ),
+    "bad traction": ({"traction": "none"}, "invalid-request", "traction"),
+    "bad noise": ({"noise": {"chassis.z": -1.0}}, "identification", "chassis.z"),
+    "bad vehicle": ({"vehicle": {"name": "empty"}}, "vehicle", "chassis"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_problem_that_cannot_be_set_up_is_refused_before_it_is_queued(owner, name):
+    body, code, said = REFUSED[name]
+    runs = [owner.get("/measurements").json()[0]["id"]]
+    reply = owner.post("/identifications", json={"runs": runs, **body})
+    assert reply.status_code in (404, 422), reply.text
+    assert reply.json()["code"] == code
+    assert said in reply.json()["detail"]
+    assert owner.get("/identifications").json() == []
+
+
+def test_a_session_has_its_share_of_jobs(small_limits, clusters):
+    with open_client(small_limits) as service:
+        owner = Visitor(service)
+        submit(owner)
+        runs = [owner.get("/measurements").json()[0]["id"]]
+        refused = owner.post("/identifications", json={"runs": runs})
+        assert refused.status_code == 429
+        assert "under way" in refused.json()["detail"]

@@ -1,0 +1,185 @@
+"""Uploads: what was found in them, byte for byte back, and a sentence for every bad one."""
+
+import hashlib
+
+import pytest
+
+from .conftest import SAMPLES, Visitor, open_client, short_recording
+from .test_frames import read_binary
+
+
+def test_an_upload_says_what_was_found_in_it(visitor):
+    data = short_recording()
+    reply = visitor.upload(data, "lap.csv")
+    assert reply.status_code == 201
+    found = reply.json()
+    assert (found["name"], found["bytes"], found["samples"]) == ("lap.csv", len(data), 101)
+    assert found["sha256"] == hashlib.sha256(data).hexdigest()
+    assert found["duration"] == pytest.approx(1.0)
+    assert found["sample_step"] == pytest.approx(0.01)
+    assert found["usable_for_identification"] is True
+    assert found["missing"] == []
+    heave = next(channel for channel in found["channels"] if channel["name"] == "chassis.z")
+    assert heave["unit"] == "m"
+    assert (heave["minimum"], heave["maximum"]) == pytest.approx((-0.004, 0.004))
+    assert visitor.get(f"/measurements/{found['id']}").json() == found
+    assert visitor.get("/measurements").json()[-1] == found
+
+
+def test_a_bare_body_is_an_upload_too(visitor):
+    data = short_recording()
+    reply = visitor.post("/measurements?name=bare.csv", content=data)
+    assert reply.status_code == 201
+    assert reply.json()["name"] == "bare.csv"
+
+
+def test_the_original_comes_back_byte_for_byte(visitor):
+    """Line ends, spaces and the byte-order mark of the file included."""
+    data = b"\xef\xbb\xbf" + short_recording().replace(b"\n", b"\r\n")
+    kept = visitor.upload(data).json()
+    back = visitor.get(f"/measurements/{kept['id']}/original")
+    assert back.content == data
+    assert back.headers["content-disposition"] == 'attachment; filename="run.csv"'
+    assert back.headers["content-type"] == "application/octet-stream"
+
+
+def test_what_an_identification_lacks_is_listed(visitor):
+    data = short_recording().replace(b"chassis.a_x", b"chassis.v_x").replace(b"[m/s^2]", b"[m/s]")
+    found = visitor.upload(data).json()
+    assert found["usable_for_identification"] is False
+    assert found["missing"] == ["chassis.a_x"]
+
+
+def test_the_histories_come_as_binary_json_and_csv(visitor):
+    sample = visitor.get("/measurements").json()[0]
+    path = f"/measurements/{sample['id']}/frames?channels=chassis.z,wheel.fl.z&max_samples=500"
+    binary = visitor.get(path, headers={"Accept": "application/vnd.ridetune.frames"})
+    head, values = read_binary(binary.content)
+    assert list(values) == ["time", "chassis.z", "wheel.fl.z"]
+    assert head["mode"] == "measured"
+    assert head["samples"] <= 500
+    shown = visitor.get(path).json()
+    assert shown["values"]["chassis.z"] == pytest.approx(values["chassis.z"].tolist(), abs=1e-6)
+    csv = visitor.get(path, headers={"Accept": "text/csv"})
+    assert csv.text.startswith("time [s],")
+    assert len(csv.text.splitlines()) == sample["samples"] + 1
+
+
+def test_a_deleted_measurement_is_gone_and_its_file_with_the_last_one(visitor, settings):
+    """Two measurements of the same bytes share one original."""
+    data = short_recording()
+    first, second = visitor.upload(data).json(), visitor.upload(data).json()
+    original = settings.data / "originals" / first["sha256"][:2] / first["sha256"]
+    assert visitor.delete(f"/measurements/{first['id']}").status_code == 204
+    assert visitor.get(f"/measurements/{first['id']}").status_code == 404
+    assert original.read_bytes() == data
+    visitor.delete(f"/measurements/{second['id']}")
+    assert not original.exists()
+
+
+BAD_FILES = {
+    "empty": (b"", "empty"),
+    "binary": (bytes(range(256)) * 40, "text"),
+    "no header": (b"0,1,2\n0.1,1,2\n0.2,1,2\n", "header"),
+    "two samples": (b"time [s],chassis.z [m]\n0,0\n0.01,0\n", "2 samples"),
+    "unknown unit": (short_recording().replace(b"[mm]", b"[parsec2]", 1), "parsec2"),
+    "doubled channel": (short_recording().replace(b"wheel.fr", b"wheel.fl"), "wheel.fl.z"),
+    "misspelt channel": (short_recording().replace(b"wheel.rl.z", b"wheel.rl.zz"), "wheel.rl.z"),
+    "time falls": (short_recording().replace(b"\n0.50,", b"\n0.10,"), "line 52"),
+    "a gap": (short_recording().replace(b"\n0.50,", b"\n0.50,,,,,,,\n0.505,"), "line 52"),
+    "not a number": (short_recording().replace(b"\n0.50,", b"\n0.50,nan,"), "line 52"),
+    "overflow": (short_recording().replace(b"\n0.50,", b"\n1e999,"), "line 52"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_FILES)
+def test_a_bad_file_is_refused_with_a_sentence_and_nothing_is_kept(visitor, settings, name):
+    data, said = BAD_FILES[name]
+    before = len(visitor.get("/measurements").json())
+    files = {path.name for path in (settings.data / "originals").glob("*/*")}
+    reply = visitor.upload(data, f"{name}.csv")
+    assert reply.status_code == 422, reply.text
+    assert reply.json()["code"] == "measurement"
+    assert f"{name}.csv" in reply.json()["detail"]
+    assert said in reply.json()["detail"]
+    assert len(visitor.get("/measurements").json()) == before
+    assert {path.name for path in (settings.data / "originals").glob("*/*")} == files
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+@pytest.mark.parametrize("separators", [b",.", b";,"])
+def test_what_spreadsheets_write_is_read(visitor, encoding, separators):
+    """Semicolons with decimal commas, byte-order marks: the same numbers in all of them."""
+    column, decimal = separators[:1], separators[1:]
+    plain = short_recording()
+    data = plain.replace(b",", b"|").replace(b".", decimal).replace(b"|", column)
+    data = data.replace(b"chassis" + decimal, b"chassis.").replace(b"wheel" + decimal, b"wheel.")
+    for corner in (b"fl", b"fr", b"rl", b"rr"):
+        data = data.replace(corner + decimal + b"z", corner + b".z")
+    found = visitor.upload(data.decode().encode(encoding)).json()
+    assert found["channels"] == visitor.upload(plain).json()["channels"]
+
+
+def test_millimetres_under_a_header_of_metres_are_pointed_out(visitor):
+    """Kept, with a warning that names the channel."""
+    reply = visitor.upload(short_recording().replace(b"chassis.z [mm]", b"chassis.z [m]"))
+    assert reply.status_code == 201
+    assert any("chassis.z" in warning for warning in reply.json()["warnings"])
+
+
+def test_a_form_without_a_file_is_refused(visitor):
+    for form in ({"files": {"other": ("x.csv", b"x")}}, {"files": {"file": (None, "just text")}}):
+        reply = visitor.post("/measurements", **form)
+        assert reply.status_code == 400
+        assert "file" in reply.json()["detail"]
+
+
+@pytest.mark.parametrize(
+    ("sent", "kept"),
+    [
+        ("../../etc/passwd", "passwd"),
+        ("C:\\Users\\me\\lap 1.csv", "lap 1.csv"),
+        ("a\x00b\x1b[31m.csv", "ab[31m.csv"),
+        ("..", "measurement.csv"),
+        ("", "measurement.csv"),
+        ("x" * 300 + ".csv", "x" * 96 + ".csv"),
+        ("Überlauf.csv", "Überlauf.csv"),
+    ],
+)
+def test_a_name_is_only_a_name(visitor, sent, kept):
+    reply = visitor.request(
+        "POST", "/measurements", params={"name": sent}, content=short_recording()
+    )
+    assert reply.json()["name"] == kept
+
+
+@pytest.mark.parametrize("path", ["..%2f..%2fowner.lock", "%2e%2e/%2e%2e/owner.lock", "%00"])
+def test_an_id_is_no_path(visitor, path):
+    assert visitor.get(f"/measurements/{path}/original").status_code == 404
+
+
+def test_a_file_over_the_limit_is_refused_with_the_limit(small_limits):
+    """By the guard where the whole body is too long, by the reader where only just."""
+    with open_client(small_limits) as client:
+        visitor = Visitor(client)
+        for size in (20_001, 1_000_000):
+            reply = visitor.upload(b"x" * size, "long.csv")
+            assert reply.status_code == 413
+            assert "MB" in reply.json()["detail"]
+        assert visitor.get("/measurements").status_code == 200
+
+
+def test_a_full_session_asks_to_delete_one(small_limits):
+    """Two samples and one upload fill the three places."""
+    with open_client(small_limits) as client:
+        visitor = Visitor(client)
+        assert visitor.upload(short_recording()).status_code == 201
+        reply = visitor.upload(short_recording())
+        assert reply.status_code == 429
+        assert "delete one" in reply.json()["detail"]
+
+
+def test_a_sample_run_uploads_like_any_other_file(visitor):
+    file = SAMPLES / "detailed_manoeuvre_1.csv"
+    kept = visitor.upload(file.read_bytes(), file.name).json()
+    assert kept["sha256"] in {one["sha256"] for one in visitor.get("/measurements").json()[:-1]}

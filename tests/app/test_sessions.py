@@ -1,0 +1,117 @@
+"""Sessions: the sample project in a fresh one, and nobody sees another's."""
+
+import pytest
+from ridetune.app.settings import Settings
+
+from .conftest import Visitor, open_client
+
+
+def test_a_fresh_session_holds_the_sample_project(visitor):
+    """A car and two recordings ready for an identification, before anything was uploaded."""
+    session = visitor.get().json()
+    assert session["id"] == visitor.id
+    assert session["vehicle"] == session["baseline"]
+    assert [kept["name"] for kept in session["measurements"]] == [
+        "detailed_manoeuvre_1.csv",
+        "detailed_manoeuvre_2.csv",
+    ]
+    assert all(kept["usable_for_identification"] for kept in session["measurements"])
+    assert session["identifications"] == []
+
+
+def test_the_vehicle_is_replaced_and_the_baseline_stays(visitor):
+    vehicle = visitor.get("/vehicle").json()
+    vehicle["front"]["suspension"]["stiffness"] = 31_000.0
+    assert visitor.put("/vehicle", json=vehicle).json() == vehicle
+    assert visitor.get("/vehicle").json() == vehicle
+    assert visitor.get("/baseline").json()["front"]["suspension"]["stiffness"] != 31_000.0
+    visitor.put("/baseline", json=vehicle)
+    assert visitor.get("/baseline").json() == vehicle
+
+
+def test_a_misspelt_vehicle_is_refused_and_the_old_one_kept(visitor):
+    """The sentence names the field and the nearest known one."""
+    before = visitor.get("/vehicle").json()
+    vehicle = visitor.get("/vehicle").json()
+    vehicle["front"]["suspension"]["stifness"] = vehicle["front"]["suspension"].pop("stiffness")
+    reply = visitor.put("/vehicle", json=vehicle)
+    assert reply.status_code == 422
+    assert reply.headers["content-type"] == "application/problem+json"
+    assert reply.json()["code"] == "vehicle"
+    assert "stifness" in reply.json()["detail"]
+    assert "stiffness" in reply.json()["detail"]
+    assert visitor.get("/vehicle").json() == before
+
+
+@pytest.mark.parametrize("path", ["", "/vehicle", "/measurements", "/identifications"])
+def test_another_visitor_finds_nothing(client, visitor, path):
+    """A stranger's token opens as much as none: 404, as for a session that never was."""
+    stranger = Visitor(client)
+    address = f"/api/sessions/{visitor.id}{path}"
+    for headers in ({}, {"Authorization": f"Bearer {stranger.token}"}):
+        reply = client.get(address, headers=headers)
+        assert reply.status_code == 404
+        assert reply.json()["code"] == "not-found"
+
+
+def test_ids_of_another_session_are_not_found_in_mine(client, visitor):
+    """Knowing somebody's measurement id does not help."""
+    stranger = Visitor(client)
+    theirs = visitor.get("/measurements").json()[0]["id"]
+    for path in ("", "/frames", "/original"):
+        assert stranger.get(f"/measurements/{theirs}{path}").status_code == 404
+    assert stranger.delete(f"/measurements/{theirs}").status_code == 404
+    rims = {"rims": {"measurement": theirs}}
+    assert stranger.post("/identifications", json={"runs": [theirs]}).status_code == 404
+    assert visitor.get(f"/measurements/{theirs}").status_code == 200
+    assert stranger.post("/simulations", json=rims).status_code == 404
+
+
+def test_the_token_is_a_cookie_that_scripts_cannot_read(client):
+    made = client.post("/api/sessions")
+    cookie = made.headers["set-cookie"]
+    assert cookie.startswith(f"ridetune_{made.json()['id']}=")
+    assert "HttpOnly" in cookie
+    assert "SameSite=strict" in cookie
+    assert client.get(f"/api/sessions/{made.json()['id']}").status_code == 200
+
+
+def test_the_token_itself_is_not_kept(settings):
+    """What lies in the data directory opens no session."""
+    with open_client(settings) as client:
+        visitor = Visitor(client)
+        kept = b"".join(file.read_bytes() for file in settings.data.glob("ridetune.sqlite*"))
+    assert visitor.id.encode() in kept
+    assert visitor.token.encode() not in kept
+
+
+def test_a_deleted_session_is_gone_with_all_it_held(client, visitor, settings):
+    uploaded = visitor.upload(client.get("/static/index.html").content, "x.csv")
+    assert uploaded.status_code == 422
+    assert visitor.delete().status_code == 204
+    assert visitor.get().status_code == 404
+    assert list((settings.data / "originals").glob("*/*")) == []
+
+
+def test_too_many_sessions_are_refused_with_a_sentence(small_limits):
+    with open_client(small_limits) as client:
+        Visitor(client), Visitor(client)
+        reply = client.post("/api/sessions")
+        assert reply.status_code == 503
+        assert "2 sessions" in reply.json()["detail"]
+        assert int(reply.headers["retry-after"]) > 0
+
+
+def test_a_service_with_a_token_gives_sessions_only_to_who_brings_it(tmp_path):
+    with open_client(Settings(data=tmp_path, token="open sesame")) as client:
+        assert client.post("/api/sessions").status_code == 403
+        assert client.get("/", follow_redirects=False).status_code == 403
+        allowed = client.post("/api/sessions", headers={"Authorization": "Bearer open sesame"})
+        assert allowed.status_code == 201
+        client.cookies.clear()
+        link = client.get("/?token=open%20sesame&dpr=1", follow_redirects=False)
+        assert link.status_code == 303
+        assert link.headers["location"].endswith("/?dpr=1")
+        assert (
+            client.get("/", follow_redirects=False).headers["location"] in link.headers["location"]
+        )

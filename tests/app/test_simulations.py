@@ -1,0 +1,196 @@
+"""Interactive simulations: the three modes over HTTP, and refusals before any work."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+from numpy.testing import assert_allclose
+from ridetune.app.main import create_app
+from ridetune.app.settings import Settings
+from ridetune.engine.manoeuvre import reference_manoeuvres
+from ridetune.engine.simulation import simulate_road
+from ridetune.engine.vehicle_file import reference_vehicles, vehicle_to_json
+
+from .conftest import ADDRESS, Visitor, open_client
+from .test_frames import read_binary
+
+BINARY = {"Accept": "application/vnd.ridetune.frames"}
+PAPER = vehicle_to_json(reference_vehicles()["paper"])
+
+
+@pytest.fixture(scope="module")
+def driver(tmp_path_factory):
+    """One session for all simulations that change nothing."""
+    with open_client(Settings(data=tmp_path_factory.mktemp("drive"))) as client:
+        yield Visitor(client)
+
+
+@pytest.fixture(scope="module")
+def recording(driver) -> str:
+    return driver.get("/measurements").json()[0]["id"]
+
+
+def test_a_manoeuvre_gives_what_the_engine_gives(driver):
+    """Oracle: the engine called directly; single precision on the wire."""
+    body = {
+        "vehicle": PAPER,
+        "manoeuvre": "2",
+        "channels": ["chassis.z", "tyre.fl.load"],
+        "seq": 41,
+    }
+    head, values = read_binary(driver.post("/simulations", json=body, headers=BINARY).content)
+    run = simulate_road(reference_vehicles()["paper"], reference_manoeuvres()["2"]).run
+    for name in ("time", "chassis.z", "tyre.fl.load"):
+        assert_allclose(values[name], run[name], rtol=1e-6, atol=1e-9)
+    assert (head["seq"], head["mode"], head["duration"]) == (41, "road", 20.0)
+    assert set(head["negative_load_share"]) == {"fl", "fr", "rl", "rr"}
+    assert {"name", "label", "value", "unit"} <= set(head["metrics"][0])
+
+
+def test_without_a_body_of_its_own_it_is_the_sessions_car_in_manoeuvre_2(driver):
+    plain = driver.post("/simulations", json={"max_samples": 2000, "channels": ["chassis.z"]})
+    assert plain.headers["content-type"] == "application/json"
+    asked = {"manoeuvre": "2", "max_samples": 2000, "channels": ["chassis.z"]}
+    asked["vehicle"] = driver.get("/vehicle").json()
+    assert plain.json()["values"] == driver.post("/simulations", json=asked).json()["values"]
+
+
+def test_values_are_put_into_the_car(driver):
+    """A slider's move is the same as a car with that number in it."""
+    stiff = {**PAPER, "front": {**PAPER["front"]}}
+    stiff["front"]["suspension"] = {**PAPER["front"]["suspension"], "stiffness": 40_000.0}
+    common = {"manoeuvre": "bump", "channels": ["chassis.z"], "max_samples": 100}
+    moved = {"vehicle": PAPER, "values": {"front.suspension.stiffness": 40_000.0}, **common}
+    replies = [
+        driver.post("/simulations", json=body).json()["values"]
+        for body in (moved, {"vehicle": stiff, **common}, {"vehicle": PAPER, **common})
+    ]
+    assert replies[0] == replies[1]
+    assert replies[0] != replies[2]
+
+
+def test_a_recording_is_followed_on_its_rims(driver, recording):
+    body = {"rims": {"measurement": recording}, "channels": ["chassis.z", "time"]}
+    head, values = read_binary(driver.post("/simulations", json=body, headers=BINARY).content)
+    assert head["mode"] == "rims"
+    assert {"chassis.z", "chassis.pitch", "chassis.roll"} <= set(head["fit_percent"])
+    assert head["samples"] == driver.get(f"/measurements/{recording}").json()["samples"]
+    assert np.all(np.isfinite(values["chassis.z"]))
+
+
+def test_a_rig_test_and_a_recorded_one_agree(driver):
+    """A simulation's own CSV with the posts' heights, uploaded, moves the car the same way."""
+    heave = {**driver.client.get("/api/manoeuvres/heave").json(), "duration": 3.0}
+    body = {"manoeuvre": heave, "vehicle": PAPER}
+    direct = driver.post("/simulations", json={**body, "channels": ["chassis.z"]}).json()
+    csv = driver.post("/simulations", json=body, headers={"Accept": "text/csv"})
+    kept = driver.upload(csv.content, "rig.csv").json()
+    again = {"posts": {"measurement": kept["id"]}, "vehicle": PAPER, "channels": ["chassis.z"]}
+    recorded = driver.post("/simulations", json=again).json()
+    assert direct["mode"] == recorded["mode"] == "posts"
+    # A spline through the samples stands for the sine sweep: a few micrometres at 3 s.
+    assert_allclose(recorded["values"]["chassis.z"], direct["values"]["chassis.z"], atol=5e-5)
+
+
+def test_the_linear_model_has_no_arms(driver):
+    """A channel the model lacks is left out of the head, not refused."""
+    body = {"model": "7dof", "channels": ["chassis.z", "arm.fl.angle"], "max_samples": 50}
+    reply = driver.post("/simulations", json=body)
+    assert reply.status_code == 200
+    assert [channel["name"] for channel in reply.json()["channels"]] == ["time", "chassis.z"]
+
+
+def test_a_road_of_ones_own_replaces_the_manoeuvres(driver):
+    bump = {"kind": "bump", "begin": 20.0, "length": 2.0, "height": 0.03}
+    body = {"manoeuvre": "constant-speed-c", "road": bump, "channels": ["road.fl.z"]}
+    values = driver.post("/simulations", json=body).json()["values"]["road.fl.z"]
+    assert max(values) == pytest.approx(0.03, rel=1e-2)
+    assert min(values) == 0.0
+
+
+REFUSED = {
+    "unknown manoeuvre": ({"manoeuvre": "3"}, 404, "constant-speed-c"),
+    "two modes": ({"manoeuvre": "2", "rims": {"measurement": "x"}}, 400, "leave one"),
+    "unknown measurement": ({"rims": {"measurement": "x"}}, 404, "measurement"),
+    "unknown channel": ({"channels": ["chassis.y"]}, 422, "chassis.y"),
+    "unknown parameter": ({"values": {"front.suspension.stifness": 1}}, 422, "stiffness"),
+    "value out of range": ({"values": {"front.suspension.stiffness": -1}}, 422, "stiffness"),
+    "zero step": ({"step": 0}, 422, "field step"),
+    "too long": ({"manoeuvre": {"name": "x", "kind": "road", "duration": 1e9}}, 422, "duration"),
+    "too fine": (
+        {"manoeuvre": {"name": "x", "kind": "road", "duration": 600}, "step": 1e-4},
+        422,
+        "6000000 steps",
+    ),
+    "road under a rig": ({"manoeuvre": "heave", "road": {"kind": "flat"}}, 400, "rig"),
+    "road without kind": ({"road": {"sections": []}}, 422, "kind"),
+    "misspelt vehicle": ({"vehicle": {**PAPER, "chasis": {}}}, 422, "chassis"),
+    "negative mass": (
+        {"vehicle": {**PAPER, "chassis": {**PAPER["chassis"], "mass": -1}}},
+        422,
+        "chassis.mass",
+    ),
+    "one sample": ({"max_samples": 1}, 422, "max_samples"),
+    "unknown model": ({"model": "14dof"}, 422, "model"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_be_simulated_is_refused_with_a_sentence(driver, name):
+    body, status, said = REFUSED[name]
+    reply = driver.post("/simulations", json=body)
+    assert reply.status_code == status, reply.text
+    assert said in reply.json()["detail"]
+    assert reply.json()["detail"][-1] in ".?"
+
+
+def test_a_recording_that_spans_too_long_is_refused(driver):
+    """Few samples, but hours of integration."""
+    rows = b"".join(b"%d,0,0,0,0,0,0\n" % (10 * k) for k in range(1000))
+    names = [b"chassis.z [m]", b"chassis.a_x [m/s^2]"]
+    names += [b"wheel.%s.z [m]" % corner for corner in (b"fl", b"fr", b"rl", b"rr")]
+    kept = driver.upload(b"time [s]," + b",".join(names) + b"\n" + rows, "days.csv").json()
+    rims = driver.post("/simulations", json={"rims": {"measurement": kept["id"]}})
+    assert (rims.status_code, rims.json()["code"]) == (422, "over-budget")
+    fit = driver.post("/identifications", json={"runs": [kept["id"]]})
+    assert (fit.status_code, fit.json()["code"]) == (422, "over-budget")
+
+
+def test_a_form_that_does_not_exist_is_not_acceptable(driver):
+    reply = driver.post("/simulations", json={}, headers={"Accept": "image/png"})
+    assert reply.status_code == 406
+    assert "text/csv" in reply.json()["detail"]
+
+
+def test_while_the_kernels_compile_simulations_wait_and_the_rest_works(settings):
+    """503 with Retry-After, told by /readyz too; afterwards both answer."""
+    compiled = threading.Event()
+    app = create_app(settings, warm_up=lambda: [("a car", lambda: compiled.wait(20))])
+    with TestClient(app, base_url=ADDRESS) as client:
+        visitor = Visitor(client)
+        waiting = visitor.post("/simulations", json={})
+        assert (waiting.status_code, waiting.json()["code"]) == (503, "compiling")
+        assert waiting.headers["retry-after"] == "1"
+        ready = client.get("/readyz")
+        assert (ready.status_code, ready.json()["state"]) == (503, "compiling")
+        assert client.get("/healthz").status_code == 200
+        assert visitor.get("/vehicle").status_code == 200
+        compiled.set()
+        until = time.monotonic() + 10
+        while client.get("/readyz").status_code != 200:
+            assert time.monotonic() < until
+        assert visitor.post("/simulations", json={"max_samples": 2}).status_code == 200
+
+
+def test_a_failed_compilation_is_told(settings):
+    def broken() -> list:
+        raise RuntimeError("no compiler")
+
+    with TestClient(create_app(settings, warm_up=broken), base_url=ADDRESS) as client:
+        until = time.monotonic() + 10
+        while client.get("/readyz").json()["state"] == "compiling":
+            assert time.monotonic() < until
+        ready = client.get("/readyz")
+        assert (ready.status_code, ready.json()["state"]) == (503, "failed")
