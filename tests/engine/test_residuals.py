@@ -27,7 +27,7 @@ def start_of(asked):
 def exact_jacobian(asked, run):
     """Blocks of the stand-in's derivative: its basis over the noise, angles by their scale."""
     slopes = [1.0 if one.logarithmic else 10.0 * one.scale for one in asked.free]
-    basis = stand_in.basis(run.time) * np.array(slopes)
+    basis = stand_in.basis(run.time)[:, :, :-1] * np.array(slopes)
     noise = [DEFAULT_NOISE[channel] for channel in OUTPUT_CHANNELS]
     return np.concatenate([basis[:, k] / noise[k] for k in range(3)])
 

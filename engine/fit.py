@@ -1,0 +1,124 @@
+"""The result of an identification, as data; how it ended is a sentence."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .rims import RimsSettings
+from .vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+DETERMINED_BELOW = 0.15
+WEAKLY_BELOW = 0.50
+"""Half-width of the 95 % interval over |value| up to which a parameter is determined, or weakly."""
+
+
+class Outcome(StrEnum):
+    """How a fit ended; the value is the sentence the engineer reads."""
+
+    DETERMINED = "The fit converged and the runs determine every free parameter."
+    WEAKLY = "The fit converged; the runs determine some of the free parameters only weakly."
+    AT_BOUND = (
+        "The fit converged with a parameter at its bound; widen the bound, fix the parameter, "
+        "or check the runs."
+    )
+    UNDETERMINED = (
+        "The fit converged, but the runs do not determine every free parameter; fix one or "
+        "measure more."
+    )
+    ASTRAY = (
+        "The fit ended further from the measurement than the measurement's own mean; check signs "
+        "and units of the channels, the car's known data and the start values."
+    )
+    BUDGET_SPENT = (
+        "The fit ran out of evaluations before it converged; allow more or free fewer parameters."
+    )
+    STUCK = (
+        "The fit stopped because the model fails for most cars around it; choose other start "
+        "values or narrower bounds."
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterEstimate:
+    """One identified parameter, SI.
+
+    std_error, confidence_interval : infinite where the runs do not determine the parameter
+    determined : "yes" (95 % half-width under 15 % of |value|), "weakly" (under 50 %) or "no"
+        (wider, or at a bound)
+    """
+
+    name: str
+    value: float
+    unit: str
+    std_error: float
+    confidence_interval: tuple[float, float]
+    start: float
+    lower: float
+    upper: float
+    at_bound: bool
+    determined: str
+
+
+@dataclass(frozen=True, slots=True)
+class FittedRun:
+    """What was compared in one run: number of samples and the noise assumed a channel, SI."""
+
+    name: str
+    samples: int
+    noise: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """Where a fit stands after an evaluation: the best found so far.
+
+    cost : half the sum of squared residuals, in units of the noise
+    """
+
+    evaluations: int
+    simulations: int
+    cost: float
+    parameters: Mapping[str, float]
+    fit_percent: Mapping[str, Mapping[str, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """An identified car and everything known about how good it is.
+
+    vehicle : with the identified values
+    cost : half the sum of squared residuals, in units of the noise
+    correlation : (n, n) of the parameters in their order; not a number where undetermined
+    fit_percent : by run and channel
+    residuals : by run and channel, (samples,) model minus measured, SI
+    cost_history : the best cost after each evaluation
+    """
+
+    vehicle: Vehicle
+    parameters: tuple[ParameterEstimate, ...]
+    cost: float
+    correlation: Array
+    fit_percent: Mapping[str, Mapping[str, float]]
+    residuals: Mapping[str, Mapping[str, Array]]
+    outcome: Outcome
+    converged: bool
+    warnings: tuple[str, ...]
+    seconds: float
+    simulations: int
+    evaluations: int
+    cost_history: tuple[float, ...]
+    traction: str
+    settings: RimsSettings
+    runs: tuple[FittedRun, ...]
+
+
+def determined(value: float, half_width: float, at_bound: bool) -> str:
+    """ "yes", "weakly" or "no"."""
+    if at_bound or not half_width < WEAKLY_BELOW * abs(value):
+        return "no"
+    return "yes" if half_width < DETERMINED_BELOW * abs(value) else "weakly"

@@ -1,0 +1,63 @@
+"""A fit as JSON: `fit.json`, whose "vehicle" any command takes as a car.
+
+Numbers are SI. JSON knows neither infinity nor not-a-number: both become null, which stands for
+"not determined by the runs" (and, in fit_percent, for a channel that never moves).
+"""
+
+import json
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from .fit import Fit, ParameterEstimate
+from .vehicle_file import vehicle_to_json
+
+
+def fit_to_json(fit: Fit) -> dict[str, Any]:
+    """Everything in a fit but its residual histories."""
+    return _plain(
+        {
+            "vehicle": vehicle_to_json(fit.vehicle),
+            "parameters": [_parameter(one) for one in fit.parameters],
+            "correlation": fit.correlation.tolist(),
+            "outcome": str(fit.outcome),
+            "converged": fit.converged,
+            "warnings": list(fit.warnings),
+            "cost": fit.cost,
+            "cost_history": list(fit.cost_history),
+            "fit_percent": {run: dict(channels) for run, channels in fit.fit_percent.items()},
+            "runs": [
+                {"name": run.name, "samples": run.samples, "noise": dict(run.noise)}
+                for run in fit.runs
+            ],
+            "traction": fit.traction,
+            "settings": asdict(fit.settings),
+            "seconds": fit.seconds,
+            "simulations": fit.simulations,
+            "evaluations": fit.evaluations,
+        }
+    )
+
+
+def write_fit(fit: Fit, path: Path | str) -> None:
+    """Write fit.json."""
+    text = json.dumps(fit_to_json(fit), indent=1, allow_nan=False, ensure_ascii=False)
+    Path(path).write_text(text + "\n", encoding="utf-8")
+
+
+def _parameter(one: ParameterEstimate) -> dict[str, Any]:
+    row = asdict(one)
+    row["confidence_interval"] = list(one.confidence_interval)
+    return row
+
+
+def _plain(value: Any) -> Any:
+    """The value with null for every number that is not finite."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    return value

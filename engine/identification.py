@@ -1,0 +1,257 @@
+"""Identification: the free parameters that make the model follow the measured runs.
+
+Least squares on (model - measured) / noise over every compared channel of every run, by the
+trust-region reflective method of scipy (`least_squares`, trf) on scaled parameters between bounds;
+`residuals` has the scaling and the derivatives, `uncertainty` the errors. docs/identification.md
+tells what the paper's campaign can and cannot determine.
+"""
+
+import time
+from collections.abc import Callable
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.stats.qmc import Halton
+
+from .errors import ProblemError
+from .fit import Fit, FittedRun, Outcome, ParameterEstimate, Progress, determined
+from .fit_findings import channel_findings, parameter_findings
+from .parameters import parameter
+from .problem import FreeParameter, Problem
+from .residuals import FAILED_TRIAL, Residuals, Simulate
+from .rims import WHEEL_CHANNELS
+from .simulation import fit_percent, rims_batch
+from .uncertainty import Uncertainty, uncertainty
+
+__all__ = ["Fit", "FreeParameter", "Outcome", "Problem", "Progress", "identify"]
+
+Array = NDArray[np.float64]
+
+MOST_EVALUATIONS = 100
+COST_TOLERANCE = 1e-8
+STEP_TOLERANCE = 1e-8
+GRADIENT_TOLERANCE = 1e-8
+
+AT_BOUND = 1e-3
+"""A value nearer to a bound than this share of the range between the bounds is at it."""
+
+
+SCATTERED_STARTS = 32
+"""Cars tried around start values that do not carry the car through the runs."""
+
+MUCH_BETTER = 0.5
+"""Such a car is taken when its squared residuals are below this share of the start's."""
+
+
+class _Search:
+    """Residuals as the optimiser calls them, keeping the best point and telling of progress."""
+
+    def __init__(self, residuals: Residuals, progress: Callable[[Progress], None] | None):
+        self.residuals = residuals
+        self.evaluations = 0
+        self.failures = 0
+        self.cost_history: list[float] = []
+        self._progress = progress
+
+    def vector(self, x: Array) -> Array:
+        """r(x); one evaluation."""
+        r = self.residuals.vector(x)
+        cost = 0.5 * float(r @ r)
+        self.evaluations += 1
+        self.failures += bool(np.any(r == FAILED_TRIAL))
+        if not self.cost_history or cost < self.cost_history[-1]:
+            self._best = x.copy(), r
+        self.cost_history.append(min([cost, *self.cost_history[-1:]]))
+        if self._progress is not None:
+            self._progress(self._state())
+        return r
+
+    def _state(self) -> Progress:
+        x, r = self._best
+        problem = self.residuals.problem
+        values = problem.values(x).tolist()
+        return Progress(
+            evaluations=self.evaluations,
+            simulations=self.residuals.simulations,
+            cost=self.cost_history[-1],
+            parameters={one.name: v for one, v in zip(problem.free, values, strict=True)},
+            fit_percent=_percents(self.residuals, r),
+        )
+
+
+def identify(
+    problem: Problem,
+    *,
+    progress: Callable[[Progress], None] | None = None,
+    cancelled: Callable[[], bool] | None = None,
+    most_evaluations: int = MOST_EVALUATIONS,
+    simulate: Simulate = rims_batch,
+) -> Fit:
+    """Fit the problem's free parameters.
+
+    progress : called after every evaluation
+    cancelled : polled throughout; Cancelled is raised within a tenth of a second of its being true
+    most_evaluations : trial points before the fit gives up
+    simulate : the model, as a function of cars, inputs and traction
+
+    A poor, undetermined or unfinished fit is a result and says so in its outcome and warnings.
+    Raises ProblemError when the model cannot follow the runs from the start values, and Cancelled.
+    """
+    began = time.perf_counter()
+    residuals = Residuals(problem, simulate, cancelled)
+    x_start = np.array([one.variable(one.start) for one in problem.free])
+    x_start, moved = _usable_start(residuals, x_start)
+    start = residuals.model(x_start)
+
+    search = _Search(residuals, progress)
+    solution = least_squares(
+        search.vector,
+        x_start,
+        cast(Any, residuals.jacobian),  # scipy's hints know no callable here
+        bounds=(residuals.lower, residuals.upper),
+        method="trf",
+        ftol=COST_TOLERANCE,
+        xtol=STEP_TOLERANCE,
+        gtol=GRADIENT_TOLERANCE,
+        max_nfev=most_evaluations,
+    )
+    r = residuals.vector(solution.x)
+    places = [block.place for block in residuals.blocks()]
+    slopes = [one.slope(float(x)) for one, x in zip(problem.free, solution.x, strict=True)]
+    jacobian = solution.jac / np.array(slopes)
+    scale = np.array([one.scale for one in problem.free])
+    errors = uncertainty([(r[place], jacobian[place]) for place in places], scale)
+    values = problem.values(solution.x)
+    estimates = _estimates(problem, values, errors)
+    warnings = [
+        *(warning for seen in problem.observations for warning in seen.inputs.warnings),
+        *moved,
+        *channel_findings(problem.observations, start, residuals.model(solution.x)),
+        *parameter_findings(estimates, errors),
+    ]
+    outcome = _outcome(solution.status, estimates, search)
+    return Fit(
+        vehicle=problem.vehicle_at(solution.x),
+        parameters=estimates,
+        cost=float(solution.cost),
+        correlation=errors.correlation,
+        fit_percent=_percents(residuals, r),
+        residuals=_histories(residuals, r),
+        outcome=outcome,
+        converged=outcome not in (Outcome.ASTRAY, Outcome.BUDGET_SPENT, Outcome.STUCK),
+        warnings=tuple(dict.fromkeys(warnings)),
+        seconds=time.perf_counter() - began,
+        simulations=residuals.simulations,
+        evaluations=search.evaluations,
+        cost_history=tuple(search.cost_history),
+        traction=problem.traction,
+        settings=problem.settings,
+        runs=tuple(
+            FittedRun(seen.name, len(seen.inputs.time), dict(seen.noise))
+            for seen in problem.observations
+        ),
+    )
+
+
+def _usable_start(residuals: Residuals, x: Array) -> tuple[Array, list[str]]:
+    """Where the search begins, and a sentence when that is not where it was told to.
+
+    Start values from which the model fails, or is further from the runs than their mean, can
+    lie where the car falls over into another equilibrium, from which no small step leads out.
+    Then a Halton sequence of cars around them is tried and the best taken, if it is much better.
+    Raises ProblemError when the model fails on every one.
+    """
+    r = residuals.vector(x)
+    if r @ r < residuals.scatter():
+        return x, []
+    reach = np.where([one.logarithmic for one in residuals.problem.free], 1.0, 2.0)
+    lower = np.maximum(residuals.lower, x - reach)
+    upper = np.minimum(residuals.upper, x + reach)
+    spread = Halton(len(x), scramble=False).random(SCATTERED_STARTS)
+    trials = [lower + (upper - lower) * share for share in spread]
+    squares = residuals.squares(trials)
+    best = int(np.argmin(squares))
+    if squares[best] < MUCH_BETTER * float(r @ r):
+        return trials[best], [
+            "The start values do not carry the car through the runs, so the fit began from others "
+            "near them; check the start values."
+        ]
+    if np.any(r == FAILED_TRIAL):
+        raise ProblemError(_failure(residuals.problem))
+    return x, []
+
+
+def _failure(problem: Problem) -> str:
+    """Why the model may fail on the runs wherever the fit could start."""
+    furthest = {
+        f"{channel} of run {seen.name}": np.max(np.abs(seen.inputs.stage_inputs[:, 0, corner]))
+        for seen in problem.observations
+        for corner, channel in enumerate(WHEEL_CHANNELS)
+    }
+    place = max(furthest, key=lambda name: furthest[name])
+    return (
+        f"The model fails at the start values and around them ({place} reaches "
+        f"{1e3 * furthest[place]:.0f} mm); check the units of the runs, the car's known data and "
+        "the start values."
+    )
+
+
+def _estimates(
+    problem: Problem, values: Array, errors: Uncertainty
+) -> tuple[ParameterEstimate, ...]:
+    found = []
+    for one, value, deviation, half_width in zip(
+        problem.free, values.tolist(), errors.std_error, errors.half_width, strict=True
+    ):
+        at_bound = min(value - one.lower, one.upper - value) < AT_BOUND * (one.upper - one.lower)
+        found.append(
+            ParameterEstimate(
+                name=one.name,
+                value=value,
+                unit=parameter(one.name).unit,
+                std_error=float(deviation),
+                confidence_interval=(value - float(half_width), value + float(half_width)),
+                start=one.start,
+                lower=one.lower,
+                upper=one.upper,
+                at_bound=at_bound,
+                determined=determined(value, float(half_width), at_bound),
+            )
+        )
+    return tuple(found)
+
+
+def _outcome(status: int, estimates: tuple[ParameterEstimate, ...], search: _Search) -> Outcome:
+    """The sentence for how the search ended; status is that of least_squares."""
+    if status <= 0:
+        return Outcome.BUDGET_SPENT
+    if search.failures > 0.5 * search.evaluations:
+        return Outcome.STUCK
+    if 2.0 * search.cost_history[-1] > search.residuals.scatter():
+        return Outcome.ASTRAY
+    if any(one.at_bound for one in estimates):
+        return Outcome.AT_BOUND
+    verdicts = {one.determined for one in estimates}
+    if "no" in verdicts:
+        return Outcome.UNDETERMINED
+    return Outcome.WEAKLY if "weakly" in verdicts else Outcome.DETERMINED
+
+
+def _percents(residuals: Residuals, r: Array) -> dict[str, dict[str, float]]:
+    """Fit percent by run and channel."""
+    percents: dict[str, dict[str, float]] = {}
+    for block in residuals.blocks():
+        error = block.noise * r[block.place]
+        percent = fit_percent(block.measured, block.measured + error)
+        percents.setdefault(block.run, {})[block.channel] = percent
+    return percents
+
+
+def _histories(residuals: Residuals, r: Array) -> dict[str, dict[str, Array]]:
+    """Model minus measured by run and channel, SI."""
+    histories: dict[str, dict[str, Array]] = {}
+    for block in residuals.blocks():
+        histories.setdefault(block.run, {})[block.channel] = block.noise * r[block.place]
+    return histories

@@ -1,0 +1,63 @@
+import numpy as np
+import pytest
+from ridetune.engine.fit_findings import poor_fit, wrong_sign, wrong_unit
+
+TIME = np.linspace(0.0, 20.0, 2001)
+BODY = 0.01 * np.sin(7.0 * TIME) + 0.003 * np.cos(3.0 * TIME)
+
+
+def test_a_channel_turned_over_is_named_with_its_remedy():
+    finding = wrong_sign("lap 1", "chassis.z", -BODY, BODY, BODY)
+    assert "chassis.z of run lap 1" in finding
+    assert "multiply it by -1" in finding
+
+
+def test_a_turned_channel_that_the_fit_has_bent_the_car_to_is_still_named():
+    assert "at the start values" in wrong_sign("lap", "chassis.z", -BODY, BODY, -BODY)
+    assert "after the fit" in wrong_sign("lap", "chassis.z", -BODY, -0.1 * BODY, BODY)
+
+
+def test_a_badly_guessed_start_is_no_wrong_sign():
+    """Oracle: a quarter of a period late has correlation 0."""
+    late = 0.01 * np.sin(7.0 * TIME - np.pi / 2)
+    assert wrong_sign("lap", "chassis.z", BODY, late, BODY) is None
+
+
+@pytest.mark.parametrize(
+    ("channel", "factor", "numbers", "header"),
+    [
+        ("chassis.z", 1000.0, "mm", "m"),
+        ("chassis.z", 1e-3, "m", "mm"),
+        ("chassis.pitch", 180.0 / np.pi, "deg", "rad"),
+        ("chassis.roll", np.pi / 180.0, "rad", "deg"),
+    ],
+)
+@pytest.mark.parametrize("guess", [0.6, 1.0, 1.8])
+def test_a_mistaken_unit_shows_in_the_amplitude(channel, factor, numbers, header, guess):
+    """The start values may be off by nearly a factor of two."""
+    finding = wrong_unit("lap", channel, factor * BODY, guess * BODY)
+    assert f"{channel} of run lap" in finding
+    assert f"in {numbers} under a header that says {header}" in finding
+
+
+@pytest.mark.parametrize("factor", [0.2, 1.0, 5.0])
+def test_a_wrong_guess_of_the_car_is_no_mistaken_unit(factor):
+    assert wrong_unit("lap", "chassis.z", factor * BODY, BODY) is None
+    assert wrong_unit("lap", "chassis.roll", factor * BODY, BODY) is None
+
+
+def test_a_channel_the_model_cannot_follow_is_named():
+    other = 0.01 * np.sin(11.0 * TIME)
+    assert "chassis.z of run lap poorly" in poor_fit("lap", "chassis.z", BODY, other, 5e-4)
+
+
+def test_a_channel_buried_in_its_stated_noise_is_not_blamed():
+    rng = np.random.default_rng(0)
+    measured = BODY + 0.02 * rng.normal(size=len(TIME))
+    assert poor_fit("lap", "chassis.z", measured, BODY, 0.02) is None
+    assert poor_fit("lap", "chassis.z", measured, BODY, 5e-4) is not None
+
+
+def test_a_dead_channel_is_named():
+    finding = poor_fit("lap", "chassis.roll", np.zeros_like(TIME), BODY, 5e-4)
+    assert "never moves" in finding
