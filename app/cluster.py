@@ -116,6 +116,9 @@ class Cluster:
         """End all workers of our own; running tasks end unheard."""
         with self._lock:
             self._closed = True
+            if self._client is not None and self._tasks:
+                # A worker that still computes would hold up the end for seconds.
+                self._client.run(worker.ask_to_stop, *self._tasks, on_error="ignore")
             self._stop()
 
     def _started(self) -> Any:

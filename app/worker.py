@@ -66,9 +66,9 @@ def run(name: str, task: Task, payload: Any) -> Ending:
         _asked_to_stop.discard(name)
 
 
-def ask_to_stop(name: str) -> None:
-    """Raise the flag of a task, in the process that runs it."""
-    _asked_to_stop.add(name)
+def ask_to_stop(*names: str) -> None:
+    """Raise the flags of tasks, in the process that runs them."""
+    _asked_to_stop.update(names)
 
 
 def kill(process: int) -> None:
