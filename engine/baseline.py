@@ -26,15 +26,17 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 from scipy.linalg import eigh, expm
 
-from .demand import Demand, point_mass_motion
+from .channels import Run
+from .demand import Demand, PostMotion, point_mass_motion
 from .equilibrium import static_loads
-from .errors import SimulationError
 from .frames import AXLES, CORNERS, side_of
 from .observation import DEFAULT_POINTS, Points
 from .road import LEFT, RIGHT, Road
 from .vehicle import Vehicle
 
 Channels = dict[str, NDArray[np.float64]]
+
+NAME = "7-DOF baseline"
 
 LONGEST_STEP = 0.002
 """Longest step of the integration, s: a 50 Hz input is followed within 0.1 %."""
@@ -205,8 +207,8 @@ def wheel_positions(vehicle: Vehicle) -> tuple[NDArray[np.float64], NDArray[np.f
 
 def simulate_road(
     vehicle: Vehicle, demand: Demand, sample_step: float, points: Points = DEFAULT_POINTS
-) -> Channels:
-    """Channels, `time` among them, along the demand's road; the way is that of the point mass."""
+) -> Run:
+    """The run along the demand's road; the way is that of the point mass."""
     road = demand.road or Road.flat()
     time, step, every = _grid(demand.duration, sample_step)
     motion = point_mass_motion(
@@ -219,22 +221,23 @@ def simulate_road(
     channels = _through_tyres(vehicle, u, slope * motion.v[:, np.newaxis], step, points)
     channels |= per_corner("road.{}.z", u)
     channels |= {"chassis.x": motion.x, "chassis.v_x": motion.v, "chassis.a_x": motion.a}
-    sampled = {name: values[::every] for name, values in ({"time": time} | channels).items()}
-    sampled |= per_corner("drive.{}.torque", demand.drive.at(sampled["time"], "left"))
-    return sampled | per_corner("brake.{}.torque", demand.brake.at(sampled["time"], "left"))
+    sampled = {name: values[::every] for name, values in channels.items()}
+    sampled |= per_corner("drive.{}.torque", demand.drive.at(time[::every], "left"))
+    sampled |= per_corner("brake.{}.torque", demand.brake.at(time[::every], "left"))
+    return Run(NAME, time[::every], sampled)
 
 
 def simulate_posts(
-    vehicle: Vehicle, demand: Demand, sample_step: float, points: Points = DEFAULT_POINTS
-) -> Channels:
-    """Channels, `time` among them, on a rig whose posts move as the demand says."""
-    if demand.posts is None:
-        raise SimulationError("This demand moves no posts; simulate it on the road.")
-    time, step, every = _grid(demand.duration, sample_step)
-    spline = CubicSpline(demand.posts.time, demand.posts.height)
+    vehicle: Vehicle, posts: PostMotion, sample_step: float, points: Points = DEFAULT_POINTS
+) -> Run:
+    """The run on a rig with moving posts, from the motion's first instant, which becomes t = 0."""
+    begin = posts.time[0]
+    time, step, every = _grid(posts.time[-1] - begin, sample_step)
+    spline = CubicSpline(posts.time - begin, posts.height)
     u, u_rate = spline(time), spline(time, 1)
     channels = _through_tyres(vehicle, u, u_rate, step, points) | per_corner("post.{}.z", u)
-    return {name: values[::every] for name, values in ({"time": time} | channels).items()}
+    sampled = {name: values[::every] for name, values in channels.items()}
+    return Run(NAME, time[::every], sampled)
 
 
 def simulate_rims(
@@ -242,8 +245,8 @@ def simulate_rims(
     time: NDArray[np.float64],
     u: NDArray[np.float64],
     points: Points = DEFAULT_POINTS,
-) -> Channels:
-    """Channels, `time` among them, moved by the wheel centres u (k, 4), m, at `time` (k,)."""
+) -> Run:
+    """The run of a car moved by its wheel centres u (k, 4), m, at `time` (k,)."""
     baseline = Baseline.of(vehicle)
     spline = CubicSpline(time, u)
     count = int(np.ceil((time[-1] - time[0]) / _grid_step(float(np.median(np.diff(time)))) - 1e-6))
@@ -257,7 +260,7 @@ def simulate_rims(
     channels = _channels(vehicle, baseline, Motion(q, rate, acceleration), points)
     force = q @ baseline.jounce.T @ baseline.rate + rate @ baseline.jounce.T @ baseline.damping
     channels |= _loads(vehicle, force + baseline.wheel_mass * u_acceleration)
-    return {"time": time} | channels
+    return Run(NAME, time, channels)
 
 
 def _through_tyres(
