@@ -5,14 +5,17 @@ names, and what a part's pose means, are therefore shared with static/poses.js:
 
     /car/body                the sprung mass, origin at its CG, axes B
     /car/wheel_fl ...        a wheel, origin at its centre
-    /car/arm_fl ...          bone 0 at the wheel centre, bone 1 at the pivot
-    /car/spring_fl, damper_  bone 0 at the wheel centre, bone 1 at the mount
-    /car/bar_front, bar_rear bone 0 on the left arm, bone 1 on the right arm
+    /car/arm_fl ...          unit length along X from the pivot to the wheel centre, scaled
+    /car/pivot_fl ...        origin at the pivot
+    /car/spring_fl ...       unit length along Z from the wheel centre to the mount, scaled
+    /car/damper_fl, rod_fl   along Z, origins at the wheel centre and at the mount
+    /car/bar_front, bar_rear unit length along Y from the right arm to the left one, scaled
     /ghost/body, wheel_fl    outlines of the car it is compared with
     /road/surface, lines     the road, origin on the ground at X = 0; the page shapes it
 
 Everything is in an earth frame that travels with the car: X = 0 under its CG, Z = 0 flat ground.
 Arms, springs and dampers lie in the plane of their wheel; they are drawn INBOARD of it to be seen.
+No skinned meshes: viser 1.1.1 fails when it has to take one down, as it does on a reconnect.
 """
 
 from typing import Protocol
@@ -39,6 +42,10 @@ GHOST = (86, 180, 233)
 ROAD = (52, 58, 66)
 MARKS = (150, 160, 172)
 SHADOW = (10, 12, 15)
+
+ARM_MESH = shapes.tube((0, 0, 0), (1, 0, 0), 0.028)
+SPRING_MESH = shapes.coil((0, 0, 0.1), (0, 0, 1), 0.062, 0.009)
+BAR_MESH = shapes.tube((0, 0, 0), (0, 1, 0), 0.014)
 
 
 class Stage(Protocol):
@@ -96,27 +103,29 @@ def _corner(scene: SceneApi, vehicle: Vehicle, corner: Corner) -> None:
     )
     hub = centre - (0, side * INBOARD, 0)
     hinge = pivot(vehicle, corner) - (0, side * INBOARD, 0)
-    mount = hub + (0, 0, axle.suspension.mount_height)
-
-    arm = shapes.merge(
-        shapes.tube(hub, hinge, 0.028),
-        shapes.tube(hub - (0, 0.06, 0), hub + (0, 0.06, 0), 0.05),
-        shapes.tube(hinge - (0, 0.07, 0), hinge + (0, 0.07, 0), 0.055),
+    height = axle.suspension.mount_height
+    mount = hub + (0, 0, height)
+    _part(
+        scene, f"/car/pivot_{corner}", shapes.tube((0, -0.07, 0), (0, 0.07, 0), 0.055), ARM, hinge
     )
-    _stretched(scene, f"/car/arm_{corner}", arm, hub, hinge, ARM)
-
-    spring, share = shapes.coil(hub + (0, 0, 0.05), mount, 0.062, 0.009)
-    _stretched(scene, f"/car/spring_{corner}", spring, hub, mount, SPRING, share)
-
-    middle = (hub + mount) / 2
-    damper = shapes.merge(
-        shapes.tube(hub, middle, 0.034),
-        shapes.tube(hub + 0.3 * (mount - hub), mount, 0.016),
-        shapes.tube(mount, mount + (0, 0, 0.025), 0.075),
+    length, turn = _towards(hub - hinge)
+    _part(scene, f"/car/arm_{corner}", ARM_MESH, ARM, hinge, turn, (length, 1, 1))
+    _part(scene, f"/car/spring_{corner}", SPRING_MESH, SPRING, hub, scale=(1, 1, height))
+    _part(
+        scene,
+        f"/car/damper_{corner}",
+        shapes.merge(
+            shapes.tube((0, 0, 0), (0, 0, 0.55 * height), 0.034),
+            shapes.tube((0, -0.07, 0), (0, 0.07, 0), 0.05),
+        ),
+        DAMPER,
+        hub,
     )
-    lower = len(shapes.tube(hub, middle, 0.034)[0])
-    share = np.arange(len(damper[0])) >= lower
-    _stretched(scene, f"/car/damper_{corner}", damper, hub, mount, DAMPER, share)
+    rod = shapes.merge(
+        shapes.tube((0, 0, -0.65 * height), (0, 0, 0), 0.016),
+        shapes.tube((0, 0, 0), (0, 0, 0.025), 0.075),
+    )
+    _part(scene, f"/car/rod_{corner}", rod, DAMPER, mount)
 
     turn = np.linspace(0, 2 * np.pi, 33)
     circle = radius * np.column_stack([np.cos(turn), np.zeros_like(turn), np.sin(turn)])
@@ -134,7 +143,8 @@ def _corner(scene: SceneApi, vehicle: Vehicle, corner: Corner) -> None:
 
 def _bar(scene: SceneApi, vehicle: Vehicle, axle: AxleName) -> None:
     left, right = (_bar_end(vehicle, corner) for corner in CORNERS if axle_of(corner) == axle)
-    _stretched(scene, f"/car/bar_{axle}", shapes.tube(left, right, 0.014), left, right, BAR)
+    scale = (1, float(np.linalg.norm(left - right)), 1)
+    _part(scene, f"/car/bar_{axle}", BAR_MESH, BAR, right, scale=scale)
 
 
 def _bar_end(vehicle: Vehicle, corner: Corner) -> np.ndarray:
@@ -231,29 +241,29 @@ def _polyline(points: np.ndarray) -> np.ndarray:
     return np.stack([points[:-1], points[1:]], axis=1)
 
 
-def _stretched(
+def _towards(direction: np.ndarray) -> tuple[float, tuple[float, float, float, float]]:
+    """Length of a direction in the XZ plane, and the quaternion that turns +X to it."""
+    x, _, z = direction
+    half = np.arctan2(-z, x) / 2
+    return float(np.hypot(x, z)), (float(np.cos(half)), 0.0, float(np.sin(half)), 0.0)
+
+
+def _part(
     scene: SceneApi,
     name: str,
     mesh: shapes.Mesh,
-    start: np.ndarray,
-    end: np.ndarray,
     colour: tuple[int, int, int],
-    share: np.ndarray | None = None,
+    position: np.ndarray,
+    turn: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0),
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
 ) -> None:
-    """A part between two bones; `share` is how far each vertex goes with the second one."""
-    vertices, faces = mesh
-    if share is None:
-        along = (vertices - start) @ (end - start) / np.sum((end - start) ** 2)
-        share = along > 0.5
-    share = np.asarray(share, dtype=float)
-    scene.add_mesh_skinned(
+    scene.add_mesh_simple(
         name,
-        vertices,
-        faces,
-        bone_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)),
-        bone_positions=np.array([start, end]),
-        skin_weights=np.column_stack([1 - share, share]),
+        *mesh,
         color=colour,
         side="double",
+        position=position,
+        wxyz=turn,
+        scale=scale,
         cast_shadow=False,
     )

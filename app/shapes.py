@@ -102,24 +102,21 @@ def tube(start: ArrayLike, end: ArrayLike, radius: float, segments: int = 14) ->
     return loft([np.tile(a, (segments, 1)), a + ring, b + ring, np.tile(b, (segments, 1))])
 
 
-def coil(
-    start: ArrayLike, end: ArrayLike, radius: float, wire: float, turns: float = 6.0
-) -> tuple[Mesh, NDArray[np.float64]]:
-    """A helical spring, and for each vertex its share of the way from start to end."""
+def coil(start: ArrayLike, end: ArrayLike, radius: float, wire: float, turns: float = 6.0) -> Mesh:
+    """A helical spring from start to end."""
     a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
     across, up = _normals(b - a)
-    steps, around = int(20 * turns), np.linspace(0, 2 * np.pi, 7, endpoint=False)
-    share = np.linspace(0, 1, steps)
+    around = np.linspace(0, 2 * np.pi, 7, endpoint=False)
     axis = (b - a) / np.linalg.norm(b - a)
     sections = []
-    for s in share:
-        turn = 2 * np.pi * turns * s
+    for share in np.linspace(0, 1, int(20 * turns)):
+        turn = 2 * np.pi * turns * share
         out = math.cos(turn) * across + math.sin(turn) * up
-        centre = a + s * (b - a) + radius * out
+        centre = a + share * (b - a) + radius * out
         sections.append(
             centre + wire * (np.outer(np.cos(around), out) + np.outer(np.sin(around), axis))
         )
-    return loft(sections), np.repeat(share, len(around))
+    return loft(sections)
 
 
 def body_sections(wheelbase: float, width: float, wheel_radius: float) -> list[Vertices]:

@@ -4,7 +4,7 @@ import { $, h } from "./dom.js";
 import { get, on } from "./store.js";
 import * as units from "./units.js";
 
-const SAME = 0.0005;
+const SAME = 0.001;
 
 export function build() {
   on("now reference measured compare", show);

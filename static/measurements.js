@@ -92,19 +92,16 @@ function show() {
 }
 
 function table(rows) {
-  return h("table", { className: "pick" },
-    h("thead", {}, h("tr", {}, ["Name", "Duration", "Sampling", "Channels", ""].map((text) =>
-      h("th", { scope: "col" }, text)))),
-    h("tbody", {}, rows.map((row) =>
-      h("tr", { className: row.id === selected ? "selected" : "" },
-        h("th", { scope: "row" }, h("button", {
-          type: "button", className: "link", "aria-pressed": row.id === selected,
-          on: { click: () => { selected = row.id; show(); } },
-        }, breakable(row.name))),
-        h("td", {}, `${units.number(row.duration, 3)} s`),
-        h("td", {}, `${units.number(1000 * row.sample_step, 3)} ms`),
-        h("td", {}, row.channels.filter(({ name }) => name !== "time").length),
-        h("td", {}, badges(row))))));
+  return h("ul", { className: "pick" }, rows.map((row) => {
+    const channels = row.channels.filter(({ name }) => name !== "time").length;
+    return h("li", {}, h("button", {
+      type: "button", "aria-pressed": row.id === selected,
+      on: { click: () => { selected = row.id; show(); } },
+    },
+    h("span", { className: "name" }, breakable(row.name)),
+    h("span", { className: "soft" }, `${units.number(row.duration, 3)} s, every ` +
+      `${units.number(1000 * row.sample_step, 3)} ms, ${channels} channels `, badges(row))));
+  }));
 }
 
 function badges(row) {

@@ -1,8 +1,7 @@
 // Where every part of the car is at one instant: pure arithmetic, no document, no server.
 //
 // Frame: X forward with its origin under the CG at rest (it travels with the car), Y left, Z up,
-// Z = 0 the flat ground. Body frame B and signs as in app/frames (ISO 8855). Nodes and bones are
-// those of app/scene.py. Motion is magnified about the state of rest: z, pitch, roll, arm angles,
+// Z = 0 the flat ground. Body frame B and signs after ISO 8855. Nodes are those of app/scene.py. Motion is magnified about the state of rest: z, pitch, roll, arm angles,
 // wheel heights and the road alike.
 
 const INBOARD = 0.19;
@@ -93,17 +92,26 @@ export function carMessages(vehicle, run, t, magnification) {
     const hinge = inboard(body.place(pivot));
     const mount = inboard(body.place([hub[0], hub[1], hub[2] + mountHeight]));
     const turn = product(body.wxyz, aboutY(angle + travelled / radius));
+    const [, strut] = turnTo([0, 0, 1], inner, mount);
+    const [length, along] = turnTo([1, 0, 0], hinge, inner);
     messages.push(
       ...pose(`/car/wheel_${name}`, centre, turn),
-      ...bones(`/car/arm_${name}`, inner, hinge),
-      ...bones(`/car/spring_${name}`, inner, mount),
-      ...bones(`/car/damper_${name}`, inner, mount),
+      ...pose(`/car/pivot_${name}`, hinge, body.wxyz),
+      ...pose(`/car/arm_${name}`, hinge, along),
+      ...pose(`/car/spring_${name}`, inner, strut),
+      ...pose(`/car/damper_${name}`, inner, strut),
+      ...pose(`/car/rod_${name}`, mount, strut),
+      update(`/car/spring_${name}`, { scale: [1, 1, distance(inner, mount)] }),
+      update(`/car/arm_${name}`, { scale: [length, 1, 1] }),
     );
     onBar[name] = inner.map((value, k) => value + BAR_SHARE * (hinge[k] - value));
   }
+  for (const [axle, right, left] of [["front", onBar.fr, onBar.fl], ["rear", onBar.rr, onBar.rl]]) {
+    const [length, across] = turnTo([0, 1, 0], right, left);
+    messages.push(...pose(`/car/bar_${axle}`, right, across),
+      update(`/car/bar_${axle}`, { scale: [1, length, 1] }));
+  }
   messages.push(
-    ...bones("/car/bar_front", onBar.fl, onBar.fr),
-    ...bones("/car/bar_rear", onBar.rl, onBar.rr),
     position("/road/surface", [-travelled, 0, 0]),
     position("/road/lines", [-travelled, 0, 0.004]),
   );
@@ -132,9 +140,21 @@ export const update = (name, updates) =>
 const position = (name, at) => ({ type: "SetPositionMessage", name, position: at, owner: "" });
 const pose = (name, at, wxyz) =>
   [position(name, at), { type: "SetOrientationMessage", name, wxyz, owner: "" }];
-const bones = (name, start, end) =>
-  [start, end].map((at, bone_index) =>
-    ({ type: "SetBonePositionMessage", name, bone_index, position: at, owner: "" }));
+
+const distance = (a, b) => Math.hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]);
+
+/** Length from a to b, and the shortest turn that brings a unit axis into that direction. */
+function turnTo(axis, a, b) {
+  const length = distance(a, b) || 1e-9;
+  const d = [0, 1, 2].map((k) => (b[k] - a[k]) / length);
+  const w = 1 + axis[0] * d[0] + axis[1] * d[1] + axis[2] * d[2];
+  // Straight back: half a turn about Z, or about X for the Z axis.
+  if (w < 1e-6) return [length, axis[2] ? [0, 1, 0, 0] : [0, 0, 0, 1]];
+  const q = [w, axis[1] * d[2] - axis[2] * d[1], axis[2] * d[0] - axis[0] * d[2],
+    axis[0] * d[1] - axis[1] * d[0]];
+  const size = Math.hypot(...q);
+  return [length, q.map((value) => value / size)];
+}
 
 const aboutY = (angle) => [Math.cos(angle / 2), 0, Math.sin(angle / 2), 0];
 

@@ -14,12 +14,14 @@ const CAMERAS = {
 };
 const GHOSTS = { reference: [86, 180, 233], measured: [226, 230, 236] };
 const PATIENCE = 12000;
+const SCALE_STEP = 2e-4;
 
 let frame = null;
 let parts = new Set();
 let shownRoad = null;
 let shownGhost = null;
 let waiting = 0;
+const scales = new Map();
 /** What the browser tests look at. */
 export const seen = { connected: false, built: false, poses: 0, last: [] };
 
@@ -37,6 +39,7 @@ export function build(sid, { askForCar }) {
       seen.built = parts.has("/car/body");
       shownRoad = null;
       shownGhost = null;
+      scales.clear();
       if (seen.built) {
         note("");
         refresh();
@@ -70,7 +73,14 @@ function note(text) {
   box.textContent = text;
 }
 
-function inject(messages) {
+/** Hand messages to viser; a scale that has not changed is not worth a render of its part. */
+function inject(all) {
+  const messages = all.filter(({ name, updates }) => {
+    if (!updates?.scale) return true;
+    const before = scales.get(name);
+    scales.set(name, updates.scale);
+    return !before || updates.scale.some((x, k) => Math.abs(x - before[k]) > SCALE_STEP);
+  });
   seen.last = messages;
   seen.poses += 1;
   return frame?.contentWindow?.bridge?.inject(messages) ?? false;

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from ridetune.app import scene, shapes
-from ridetune.engine.frames import CORNERS, side_of
+from ridetune.engine.frames import AXLES, CORNERS, side_of
 from ridetune.engine.vehicle_file import reference_vehicles
 
 
@@ -35,9 +35,17 @@ def nodes(vehicle):
     return recorder.nodes
 
 
-def bones(nodes, name):
+def ends(nodes, name, axis):
+    """Where a part of unit length along an axis begins and ends."""
     _, _, options = nodes[name]
-    return options["bone_positions"]
+    w, x, y, z = options["wxyz"]
+    assert (x, z) == (0.0, 0.0)
+    turn = 2 * np.arctan2(y, w)
+    rotation = np.array(
+        [(np.cos(turn), 0, np.sin(turn)), (0, 1, 0), (-np.sin(turn), 0, np.cos(turn))]
+    )
+    start = np.asarray(options["position"])
+    return start, start + rotation @ (np.asarray(axis) * options["scale"])
 
 
 @pytest.mark.parametrize("corner", CORNERS)
@@ -50,7 +58,7 @@ def test_wheels_stand_on_the_ground(nodes, vehicle, corner):
 @pytest.mark.parametrize("corner", CORNERS)
 def test_arms_reach_from_the_wheel_centre_to_the_pivot(nodes, vehicle, corner):
     """docs/model.md: the pivot lies d from the contact point and d tan(phi) above the ground."""
-    hub, hinge = bones(nodes, f"/car/arm_{corner}")
+    hinge, hub = ends(nodes, f"/car/arm_{corner}", (1, 0, 0))
     axle = vehicle.axle_at(corner)
     assert hub[2] == pytest.approx(axle.wheel.radius)
     assert abs(hinge[0] - hub[0]) == pytest.approx(abs(axle.pivot.distance))
@@ -61,19 +69,16 @@ def test_arms_reach_from_the_wheel_centre_to_the_pivot(nodes, vehicle, corner):
 
 @pytest.mark.parametrize("corner", CORNERS)
 def test_springs_stand_upright_under_their_mounts(nodes, vehicle, corner):
-    hub, mount = bones(nodes, f"/car/spring_{corner}")
+    hub, mount = ends(nodes, f"/car/spring_{corner}", (0, 0, 1))
     assert_allclose(mount - hub, (0, 0, vehicle.axle_at(corner).suspension.mount_height))
     assert np.sign(hub[1]) == side_of(corner)
 
 
-def test_stretched_parts_follow_their_bones_only(nodes):
-    """Weights of the two bones sum to one, so a part moves with its ends and nothing else."""
-    for kind, _, options in nodes.values():
-        if kind == "add_mesh_skinned":
-            weights = options["skin_weights"]
-            assert_allclose(weights.sum(axis=1), 1.0)
-            assert weights.min() >= 0.0
-            assert weights.min(axis=0) == pytest.approx(0.0, abs=0.2)
+@pytest.mark.parametrize("axle", AXLES)
+def test_stabilizer_bars_join_the_two_arms(nodes, axle):
+    right, left = ends(nodes, f"/car/bar_{axle}", (0, 1, 0))
+    assert_allclose(left, right * (1, -1, 1))
+    assert left[1] > 0
 
 
 def test_ghosts_are_hidden_until_the_page_shows_them(nodes):
@@ -88,7 +93,7 @@ def test_ghosts_are_hidden_until_the_page_shows_them(nodes):
         shapes.tube((0, 0, 0), (1, 0, 0), 0.1),
         shapes.tyre(0.3, 0.2),
         shapes.rim(0.3, 0.2),
-        shapes.coil((0, 0, 0), (0, 0, 1), 0.1, 0.01)[0],
+        shapes.coil((0, 0, 0), (0, 0, 1), 0.1, 0.01),
     ],
 )
 def test_meshes_refer_to_their_own_vertices_and_all_of_them(mesh):
