@@ -174,7 +174,7 @@ def _period(length: float) -> float:
     return period
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=4)
 def unit_profiles(period: float, seed: int, roughness: Roughness) -> tuple[NDArray, NDArray]:
     """Left and right profile of unit Gd(n0) on one period of the grid, read-only."""
     size = round(period / SPACING)

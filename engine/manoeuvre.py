@@ -68,7 +68,9 @@ class Manoeuvre:
     seed: Annotated[int, Range("1", 0, 2**53)] = 0
 
     def __post_init__(self) -> None:
-        """Refuse parts that do not belong to the kind."""
+        """Refuse parts that do not belong to the kind, and a seed that makes no numbers."""
+        if self.seed < 0:
+            raise ManoeuvreError(f"seed is {self.seed}; give a whole number from 0 on.")
         driven = self.drive or self.brake or self.road or self.initial_speed
         if self.kind == "posts" and (driven or self.posts is None):
             raise ManoeuvreError(

@@ -7,6 +7,7 @@ import numpy as np
 
 from .curves import SweptSine
 from .demand import PostMotion
+from .errors import ManoeuvreError
 from .vehicle import Range
 
 Pattern = Literal["heave", "pitch", "roll", "warp"]
@@ -28,6 +29,9 @@ POINTS_PER_WAVE = 40
 LONGEST_STEP = 0.005
 """s."""
 
+MOST_POINTS = 500_000
+"""Most samples of a sweep."""
+
 
 @dataclass(frozen=True, slots=True)
 class PostSweep:
@@ -43,6 +47,11 @@ class PostSweep:
         """Heights of the posts over time."""
         fastest = max(self.first_frequency, self.last_frequency)
         step = min(LONGEST_STEP, 1.0 / (POINTS_PER_WAVE * fastest))
+        if duration > MOST_POINTS * step:
+            raise ManoeuvreError(
+                f"A sweep up to {fastest:g} Hz may last {MOST_POINTS * step:g} s at most, not"
+                f" {duration:g} s; shorten it."
+            )
         time = np.linspace(0.0, duration, int(np.ceil(duration / step)) + 1)
         sweep = SweptSine(
             span=duration,

@@ -12,6 +12,9 @@ from .road_shapes import Pairing, Tracks, bump, pothole, sine_sweep
 from .vehicle import Range
 
 RoadClass = Literal["A", "B", "C", "D", "E", "F", "G", "H"]
+MOST_WAVES = 5000
+"""Most waves of the last wavelength that a sine sweep may be long."""
+
 TORQUE_END = "torque-end"
 """A section may begin where the car is when the drive torque ends."""
 
@@ -156,6 +159,15 @@ class SineSweepRoad:
     amplitude: Annotated[float, Range("m", 1e-6, 0.5)]
     last_amplitude: Annotated[float, Range("m", 1e-6, 0.5)]
     tracks: Pairing = "in-phase"
+
+    def __post_init__(self) -> None:
+        """Refuse a road of more waves than it is worth the memory."""
+        shortest = min(self.first_wavelength, self.last_wavelength)
+        if self.length > MOST_WAVES * shortest:
+            raise RoadError(
+                f"length is more than {MOST_WAVES} waves of {shortest:g} m; shorten it to"
+                f" {MOST_WAVES * shortest:g} m."
+            )
 
     def build(self, place: Place, seed: int) -> Road:
         """The road itself."""

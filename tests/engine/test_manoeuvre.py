@@ -274,6 +274,18 @@ def test_a_section_at_the_end_of_a_torque_that_never_ends_is_refused():
     assert caught.value.code == "road"
 
 
+def test_a_negative_seed_is_refused_wherever_it_comes_from():
+    with pytest.raises(ManoeuvreError, match="seed is -1; give a whole number from 0 on"):
+        replace(reference_manoeuvres()["1"], seed=-1)
+
+
+def test_a_sweep_that_would_take_too_much_memory_is_refused():
+    posts = replace(reference_manoeuvres()["heave"].posts, last_frequency=100.0)
+    sweep = replace(reference_manoeuvres()["heave"], duration=600.0, posts=posts)
+    with pytest.raises(ManoeuvreError, match=r"up to 100 Hz may last 125 s at most, not 600 s"):
+        sweep.demand(paper_vehicle())
+
+
 def test_a_file_is_named_with_the_line_of_the_mistake(tmp_path):
     path = tmp_path / "mine.json"
     path.write_text('{"name": "x",\n "kind" "road"}')

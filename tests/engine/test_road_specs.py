@@ -83,6 +83,11 @@ def test_a_car_that_stays_has_a_road_all_the_same():
         ({"kind": "pothole", "begin": 5, "length": 0.1, "depth": 0.05}, "edge is longer than half"),
         ({"kind": "bump", "begin": -1, "length": 1, "height": 0.05}, "begin is -1, but must lie"),
         ({"kind": "bump", "begin": 1, "length": 1, "height": 50}, "height is 50, but must lie"),
+        (
+            {"kind": "sine-sweep", "begin": 0, **SWEEP, "amplitude": 0.1, "last_amplitude": 0.1}
+            | {"length": 20000},
+            "more than 5000 waves of 1 m; shorten it to 5000 m",
+        ),
         ({"kind": "hump"}, 'did you mean "bump"'),
         ({"begin": 5}, "kind is missing"),
         ("bump", 'is "bump", but must be an object of kind "flat"'),
