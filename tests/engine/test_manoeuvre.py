@@ -2,7 +2,9 @@
 
 import copy
 import json
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -295,3 +297,11 @@ def test_a_file_is_named_with_the_line_of_the_mistake(tmp_path):
         read_manoeuvre(tmp_path / "none.json")
     path.write_text(json.dumps(BRAKING))
     assert read_manoeuvre(path).initial_speed == 20.0
+
+
+def test_the_documented_manoeuvres_are_read_and_driven():
+    text = (Path(__file__).parents[2] / "docs" / "manoeuvres.md").read_text("utf-8")
+    examples = re.findall(r"```json\n(.*?)```", text, re.DOTALL)
+    assert len(examples) == 2
+    for example in examples:
+        manoeuvre_from_json(json.loads(example)).demand(paper_vehicle())
