@@ -143,6 +143,7 @@ class Cluster:
         from distributed import Client, LocalCluster
 
         config.set(CONFIGURATION)
+        logging.getLogger("distributed").setLevel(logging.ERROR)
         if self._address:
             return Client(self._address, set_as_default=False, name="ridetune")
         no_dashboard: Any = None

@@ -38,8 +38,17 @@ class Kind:
 class Jobs:
     """Submit, cancel, follow."""
 
-    def __init__(self, store: Store, cluster: Cluster, kinds: Mapping[str, Kind]):
+    def __init__(
+        self,
+        store: Store,
+        cluster: Cluster,
+        kinds: Mapping[str, Kind],
+        *,
+        ready: Callable[[], bool] = lambda: True,
+    ):
+        """Jobs are sent once `ready` returns, and only if it returns True."""
         self._store = store
+        self._ready = ready
         self._cluster = cluster
         self._kinds = kinds
         self._progress: dict[str, Mapping[str, Any]] = {}
@@ -154,6 +163,8 @@ class Jobs:
     # Inside
 
     def _send(self, job: Job) -> None:
+        if not self._ready():
+            return
         with self._lock:
             if job.id in self._cancelled:
                 return

@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import logging
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from importlib.metadata import version
 from importlib.util import find_spec
@@ -30,7 +30,7 @@ from .recordings import Recordings
 from .services import Services, Viewers
 from .settings import Settings
 from .store import Store
-from .warmup import Step, WarmUp, simulation_steps
+from .warmup import WarmUp, ready_to_simulate
 
 log = logging.getLogger(__name__)
 
@@ -41,7 +41,7 @@ def create_app(
     settings: Settings,
     *,
     store: Store | None = None,
-    warm_up: Callable[[], Sequence[Step]] = simulation_steps,
+    warm_up: Callable[[WarmUp], object] = ready_to_simulate,
 ) -> FastAPI:
     """The service; its data directory is locked from here or from start-up until it stops."""
 
@@ -88,10 +88,11 @@ def create_app(
 
 
 def _services(
-    settings: Settings, store: Store | None, warm_up: Callable[[], Sequence[Step]]
+    settings: Settings, store: Store | None, warm_up: Callable[[WarmUp], object]
 ) -> Services:
     store = store or Store(settings.data, settings.limits)
     recordings = Recordings(store)
+    warmup = WarmUp(warm_up)
     return Services(
         settings=settings,
         store=store,
@@ -102,8 +103,9 @@ def _services(
             store,
             Cluster(settings.cluster, store.directory.scratch),
             {KIND: identification(store, recordings)},
+            ready=warmup.wait,
         ),
-        warmup=WarmUp(warm_up),
+        warmup=warmup,
         viewers=_viewers(),
     )
 
@@ -117,6 +119,7 @@ def _viewers() -> Viewers | None:
 
 
 def _close(services: Services) -> None:
+    services.warmup.close()
     services.interactive.close()
     services.jobs.close()
     if services.viewers is not None:

@@ -2,8 +2,10 @@
 
 import contextlib
 import logging
+import os
 import resource
 import socket
+from pathlib import Path
 
 import uvicorn
 
@@ -22,6 +24,7 @@ def serve(settings: Settings) -> None:
     settings.check_bind()
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
     _allow_many_files()
+    _find_cache(settings)
     with _listen(settings) as listener:
         store = Store(settings.data, settings.limits)
         host, port = listener.getsockname()[:2]
@@ -72,3 +75,12 @@ def _allow_many_files() -> None:
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = FILES if most == resource.RLIM_INFINITY else min(FILES, most)
     resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))
+
+
+def _find_cache(settings: Settings) -> None:
+    """Keep compiled code with the data where the user has no cache, as a system service has not."""
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    try:
+        Path(home, "ridetune").mkdir(parents=True, exist_ok=True)
+    except OSError:
+        os.environ.setdefault("RIDETUNE_CACHE", str(settings.data / "cache"))

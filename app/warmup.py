@@ -1,55 +1,77 @@
-"""Compile the kernels in the background while the page is already served.
+"""Make the kernels ready in the background while the page is already served.
 
-The first start on a machine compiles for some tens of seconds, later ones read the result from
-disk. Everything but simulating works meanwhile.
+The first start on a machine compiles for up to a minute, later ones read the result from disk in
+about a second. Everything but simulating works meanwhile.
 """
 
 import logging
+import subprocess
+import sys
 import threading
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable
 from typing import Literal
 
+from .compile import compile_all, is_compiled
 from .errors import Compiling
 from .samples import sample_project
 
 log = logging.getLogger(__name__)
 
 State = Literal["compiling", "ready", "failed"]
-Step = tuple[str, Callable[[], object]]
 
 
 class WarmUp:
-    """Runs each step once, in a thread of its own, and says how far it is."""
+    """Does its work once, in a thread of its own, and says how far it is."""
 
-    def __init__(self, steps: Callable[[], Sequence[Step]]):
-        self._steps = steps
+    def __init__(self, work: "Callable[[WarmUp], object]"):
+        self._work = work
         self.state: State = "compiling"
         self.message = "Compiling the simulation; the first start takes up to a minute."
+        self._ended = threading.Event()
+        self.closed = False
+        self._apart: subprocess.Popen[str] | None = None
         self._thread = threading.Thread(target=self._run, name="warm-up", daemon=True)
 
     def start(self) -> None:
         """Begin."""
         self._thread.start()
 
+    def tell(self, message: str) -> None:
+        """Say what is being done."""
+        self.message = message
+
     def require(self) -> None:
         """Refuse work that needs the kernels while they are not there."""
         if self.state == "compiling":
             raise Compiling(self.message, retry_after=1)
 
-    def join(self, seconds: float) -> None:
-        """Wait for the end."""
-        self._thread.join(seconds)
+    def wait(self) -> bool:
+        """Wait for the end; False if the service stops before it."""
+        self._ended.wait()
+        return not self.closed
+
+    def close(self) -> None:
+        """Stop waiting for it."""
+        self.closed = True
+        if self._apart is not None:
+            self._apart.kill()
+        self._ended.set()
+
+    def compile_apart(self) -> None:
+        """Compile in another process, so that this one stays small and quick to answer."""
+        with subprocess.Popen(
+            [sys.executable, "-m", compile_all.__module__],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            text=True,
+        ) as self._apart:
+            assert self._apart.stdout is not None
+            for line in self._apart.stdout:
+                self.tell(line.strip())
 
     def _run(self) -> None:
         try:
-            steps = self._steps()
-            for number, (what, step) in enumerate(steps, start=1):
-                self.message = (
-                    f"Compiling {what} ({number} of {len(steps)}); "
-                    "the first start takes up to a minute."
-                )
-                step()
+            self._work(self)
         except Exception:
             log.exception("the simulation could not be compiled")
             self.state = "failed"
@@ -58,29 +80,13 @@ class WarmUp:
             )
         else:
             self.state, self.message = "ready", "Ready."
+        self._ended.set()
 
 
-def simulation_steps() -> Sequence[Step]:
-    """One call of every mode, short, so that each kernel is compiled or loaded."""
-    from ..engine.manoeuvre import reference_manoeuvres
-    from ..engine.rims import RimsSettings, prepare
-    from ..engine.simulation import rims_batch, simulate_posts, simulate_rims, simulate_road
-    from ..engine.vehicle_file import reference_vehicles
-
-    car = reference_vehicles()["paper"]
-    manoeuvres = reference_manoeuvres()
-    rolling = replace(manoeuvres["coast"], duration=0.5)
-    shaken = replace(manoeuvres["heave"], duration=0.5)
-
-    def follow_rims() -> None:
-        driven = simulate_road(car, rolling).run
-        for traction in ("exact", "paper"):
-            simulate_rims(car, driven, traction=traction)
-        rims_batch([car, car], prepare(driven, car, RimsSettings()), "exact")
-
-    return (
-        ("the sample project", sample_project),
-        ("the car on the road", lambda: simulate_road(car, rolling)),
-        ("the car on the rig", lambda: simulate_posts(car, shaken)),
-        ("the car on its rims", follow_rims),
-    )
+def ready_to_simulate(warmup: WarmUp) -> None:
+    """The service's own warm-up: the sample project, then every kernel."""
+    sample_project()
+    if not is_compiled():
+        warmup.compile_apart()
+    if not warmup.closed:
+        compile_all(warmup.tell)

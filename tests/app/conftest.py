@@ -16,7 +16,7 @@ SAMPLES = Path(__file__).parents[2] / "sample_runs"
 
 def open_client(settings: Settings, **options) -> TestClient:
     """A client of a fresh service that takes the kernels as compiled; enter it to start."""
-    app = create_app(settings, warm_up=lambda: ())
+    app = create_app(settings, warm_up=lambda warmup: None)
     return TestClient(app, base_url=ADDRESS, **options)
 
 

@@ -9,6 +9,7 @@ from fastapi.testclient import TestClient
 from numpy.testing import assert_allclose
 from ridetune.app.main import create_app
 from ridetune.app.settings import Settings
+from ridetune.app.warmup import WarmUp
 from ridetune.engine.manoeuvre import reference_manoeuvres
 from ridetune.engine.simulation import simulate_road
 from ridetune.engine.vehicle_file import reference_vehicles, vehicle_to_json
@@ -167,7 +168,7 @@ def test_a_form_that_does_not_exist_is_not_acceptable(driver):
 def test_while_the_kernels_compile_simulations_wait_and_the_rest_works(settings):
     """503 with Retry-After, told by /readyz too; afterwards both answer."""
     compiled = threading.Event()
-    app = create_app(settings, warm_up=lambda: [("a car", lambda: compiled.wait(20))])
+    app = create_app(settings, warm_up=lambda warmup: compiled.wait(20))
     with TestClient(app, base_url=ADDRESS) as client:
         visitor = Visitor(client)
         waiting = visitor.post("/simulations", json={})
@@ -185,7 +186,7 @@ def test_while_the_kernels_compile_simulations_wait_and_the_rest_works(settings)
 
 
 def test_a_failed_compilation_is_told(settings):
-    def broken() -> list:
+    def broken(warmup: WarmUp) -> None:
         raise RuntimeError("no compiler")
 
     with TestClient(create_app(settings, warm_up=broken), base_url=ADDRESS) as client:

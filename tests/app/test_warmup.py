@@ -1,0 +1,70 @@
+"""Kernels are made ready in the background: told, waited for, stopped with the service."""
+
+import time
+
+import psutil
+import pytest
+from ridetune.app.compile import STEPS, compile_all, is_compiled
+from ridetune.app.errors import Compiling
+from ridetune.app.warmup import WarmUp
+
+
+def test_work_waits_until_the_kernels_are_there():
+    warmup = WarmUp(lambda warmup: warmup.tell("Compiling a wheel."))
+    with pytest.raises(Compiling, match="first start") as refused:
+        warmup.require()
+    assert refused.value.headers == {"Retry-After": "1"}
+    warmup.start()
+    assert warmup.wait() is True
+    assert warmup.state == "ready"
+    warmup.require()
+
+
+def test_a_failure_is_told_and_logged(caplog):
+    def broken(warmup: WarmUp) -> None:
+        raise RuntimeError("no compiler")
+
+    warmup = WarmUp(broken)
+    warmup.start()
+    assert warmup.wait() is True
+    assert warmup.state == "failed"
+    assert "log" in warmup.message
+    assert "no compiler" in caplog.text
+
+
+def test_a_cold_cache_is_filled_by_another_process(monkeypatch):
+    """Its sentences become ours; afterwards the cache holds the kernels."""
+    told: list[str] = []
+    warmup = WarmUp(lambda warmup: warmup.compile_apart())
+    monkeypatch.setattr(warmup, "tell", told.append)
+    warmup.start()
+    assert warmup.wait() is True
+    assert [message.split(" (")[0] for message in told] == [f"Compiling {what}" for what in STEPS]
+    assert is_compiled()
+
+
+def test_stopping_the_service_stops_the_compiler(monkeypatch, tmp_path):
+    """A cache of its own makes the other process compile for long; `close` does not wait for it."""
+    monkeypatch.setenv("RIDETUNE_CACHE", str(tmp_path))
+    told: list[str] = []
+    warmup = WarmUp(lambda warmup: warmup.compile_apart())
+    monkeypatch.setattr(warmup, "tell", told.append)
+    warmup.start()
+    deadline = time.monotonic() + 60
+    while not told:
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    (compiler,) = (
+        child for child in psutil.Process().children() if "ridetune.app.compile" in child.cmdline()
+    )
+    warmup.close()
+    assert warmup.wait() is False
+    _, alive = psutil.wait_procs([compiler], timeout=10)
+    assert alive == []
+
+
+def test_every_step_can_be_taken_again():
+    """Once more from the cache, here: what the service does after the other process."""
+    told: list[str] = []
+    compile_all(told.append)
+    assert len(told) == len(STEPS)
