@@ -113,14 +113,17 @@ class MujocoCar(CarTree):
 
     def arms_at(self, pose, u):
         """Arm angles (4,) that put the wheel centres u above their height at rest."""
-        arms = np.zeros(4)
-        for _ in range(12):  # Newton's method doubles the digits each time
+        arms, change = np.zeros(4), np.zeros(4)
+        for _ in range(20):
             q = np.array([0.0, *pose, *arms])
             self.place(q, np.zeros(8))
             for i, corner in enumerate(self.corners):
                 height = self.wheel_centre(q, i)[2] - corner.axle.wheel.radius
-                arms[i] += (u[i] - height) / self.at_wheel(q, i, EZ)[4 + i]
-        return arms
+                change[i] = (u[i] - height) / self.at_wheel(q, i, EZ)[4 + i]
+            arms = arms + change
+            if np.abs(change).max() < 1e-9:  # Newton's next change is below round-off
+                return arms
+        raise ValueError("a wheel centre cannot reach its height")
 
     def wheel_centre_drift(self, q, qd, i):
         """Acceleration (3,) of wheel centre i in E for qdd = 0."""
