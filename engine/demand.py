@@ -16,12 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
 from .equilibrium import static_loads
-from .frames import CORNERS, GRAVITY
+from .frames import CORNERS, CREEP_SPEED, GRAVITY
 from .road import Road
 from .vehicle import Vehicle
-
-REST_SPEED = 0.1
-"""v0 in tanh(v/v0), m/s: below it resisting forces fade, so that a car at rest stays at rest."""
 
 SAME_INSTANT = 1e-9
 """Knots closer than this are one to the point mass's motion, s."""
@@ -158,7 +155,7 @@ def _point_mass(
             share = (t - begin) / (end - begin)
             drive = drive_begin[i] + share * (drive_end[i] - drive_begin[i])
             brake = brake_begin[i] + share * (brake_end[i] - brake_begin[i])
-            return drive - math.tanh(v / REST_SPEED) * (brake + rolling)
+            return drive - math.tanh(v / CREEP_SPEED) * (brake + rolling)
 
         solution = solve_ivp(
             lambda t, y: [y[1], rate_of_speed(t, y[1])],

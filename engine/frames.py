@@ -10,6 +10,10 @@ from typing import Literal
 GRAVITY = 9.81
 """Gravity in the model, m/s2."""
 
+CREEP_SPEED = 0.1
+"""v0 of tanh(v/v0), m/s: rolling resistance and brakes fade out below it, so that a car at rest
+stays at rest."""
+
 Corner = Literal["fl", "fr", "rl", "rr"]
 AxleName = Literal["front", "rear"]
 

@@ -27,7 +27,8 @@ def source_hash() -> str:
     """Short hash over the sources that decide what the compiled code does."""
     here = Path(__file__).resolve().parent
     digest = hashlib.sha256(numba.__version__.encode())
-    for source in [Path(__file__), *sorted((here / "kernels").glob("*.py"))]:
+    constants = here / "frames.py"
+    for source in [Path(__file__), constants, *sorted((here / "kernels").glob("*.py"))]:
         digest.update(source.read_bytes())
     return digest.hexdigest()[:16]
 

@@ -3,12 +3,10 @@
 from math import sqrt
 from typing import NamedTuple
 
+from ..frames import CREEP_SPEED
 from ..jit import inlined
 from .elementary import hyperbolic_tangent
 from .vec3 import y_cross
-
-CREEP_SPEED = 0.1
-"""v0 of tanh(v/v0), m/s: rolling resistance and brakes fade out below it."""
 
 
 class Strut(NamedTuple):

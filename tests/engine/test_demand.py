@@ -5,12 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.engine.demand import (
-    REST_SPEED,
-    PiecewiseLinear,
-    point_mass_motion,
-    rolling_resistance,
-)
+from ridetune.engine.demand import PiecewiseLinear, point_mass_motion, rolling_resistance
+from ridetune.engine.frames import CREEP_SPEED
 
 from ..factories import paper_vehicle
 
@@ -81,8 +77,8 @@ def test_coasting_to_rest_follows_the_closed_form():
     """Oracle: dv/dt = -fr g tanh(v/v0) integrates to sinh(v/v0) = sinh(u/v0) exp(-fr g t/v0)."""
     vehicle, none = paper_vehicle(), PiecewiseLinear.zero(12.0)
     motion = point_mass_motion(vehicle, none, none, 0.8, 12.0, 600)
-    decay = np.exp(-0.01 * G * motion.time / REST_SPEED)
-    expected = REST_SPEED * np.arcsinh(np.sinh(0.8 / REST_SPEED) * decay)
+    decay = np.exp(-0.01 * G * motion.time / CREEP_SPEED)
+    expected = CREEP_SPEED * np.arcsinh(np.sinh(0.8 / CREEP_SPEED) * decay)
     assert_allclose(motion.v, expected, rtol=0, atol=1e-7)
     assert_allclose(motion.distance(6.0), np.trapezoid(expected[:301], dx=0.02), rtol=1e-4)
 
@@ -102,7 +98,7 @@ def test_braking_ends_at_rest_and_stays_there():
     brake = PiecewiseLinear(np.array([0.0, 10.0]), np.full((2, 4), 300.0))
     motion = point_mass_motion(vehicle, PiecewiseLinear.zero(10.0), brake, 10.0, 10.0)
     level = 4 * 300.0 / 0.30 / 1240.0 + 0.01 * G
-    assert_allclose(motion.x[-1], 10.0**2 / (2 * level), rtol=0, atol=2 * REST_SPEED**2)
+    assert_allclose(motion.x[-1], 10.0**2 / (2 * level), rtol=0, atol=2 * CREEP_SPEED**2)
     assert_allclose(motion.v[-1], 0.0, atol=1e-6)
     assert np.all(np.diff(motion.v) <= 1e-9)
 
