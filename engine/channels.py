@@ -186,12 +186,40 @@ CHANNEL_KINDS: tuple[ChannelInfo, ...] = (
         "by the left arm's angle less the right one's",
         largest=2e5,
     ),
-    _row("mount.{corner}.force_x", "N", "force", "{corner} mount force, along", "forward", _KILO),
-    _row("mount.{corner}.force_z", "N", "force", "{corner} mount force, vertical", "up", _KILO),
-    _row("pivot.{corner}.force_x", "N", "force", "{corner} pivot force, along", "forward", _KILO),
-    _row("pivot.{corner}.force_z", "N", "force", "{corner} pivot force, vertical", "up", _KILO),
+    _row(
+        "mount.{corner}.force_x",
+        "N",
+        "force",
+        "{corner} mount force on the chassis, along",
+        "forward, in the chassis's axes",
+        _KILO,
+    ),
+    _row(
+        "mount.{corner}.force_z",
+        "N",
+        "force",
+        "{corner} mount force on the chassis, vertical",
+        "up, in the chassis's axes",
+        _KILO,
+    ),
+    _row(
+        "pivot.{corner}.force_x",
+        "N",
+        "force",
+        "{corner} pivot force on the chassis, along",
+        "forward, in the chassis's axes",
+        _KILO,
+    ),
+    _row(
+        "pivot.{corner}.force_z",
+        "N",
+        "force",
+        "{corner} pivot force on the chassis, vertical",
+        "up, in the chassis's axes",
+        _KILO,
+    ),
 )
-"""The rows as documented; forces at mounts and pivots act on the chassis."""
+"""The rows as documented."""
 
 _POINT = re.compile(r"(seat|point)\.([a-z][a-z0-9_]{0,39})\.a_([xyz])")
 _POINT_SIGN = {"x": "forward", "y": "left", "z": "up"}
