@@ -30,6 +30,10 @@ class Outcome(StrEnum):
         "The fit converged, but the runs do not determine every free parameter; fix one or "
         "measure more."
     )
+    DOUBTFUL = (
+        "The fit ended, but a channel probably has the wrong sign or unit; mend it as the warnings "
+        "say and fit again."
+    )
     ASTRAY = (
         "The fit ended further from the measurement than the measurement's own mean; check signs "
         "and units of the channels, the car's known data and the start values."
@@ -41,6 +45,9 @@ class Outcome(StrEnum):
         "The fit stopped because the model fails for most cars around it; choose other start "
         "values or narrower bounds."
     )
+
+
+CONVERGED = (Outcome.DETERMINED, Outcome.WEAKLY, Outcome.AT_BOUND, Outcome.UNDETERMINED)
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,6 +22,9 @@ Histories = Mapping[str, Mapping[str, Array]]
 OPPOSITE = -0.5
 """Correlation with the model below which a channel counts as turned over."""
 
+ALIKE = 5.0
+"""Factor between measured and model amplitude up to which their signs are compared."""
+
 POOR_FIT = 50.0
 """Fit percent below which a channel is reported, unless noise alone explains it."""
 
@@ -51,22 +54,30 @@ def correlation(measured: Array, model: Array) -> float:
     return float(one @ other) / size if size > 0.0 else 0.0
 
 
+def _amplitude_ratio(measured: Array, model: Array) -> float:
+    """Measured over model amplitude; 0 for a model that never moves."""
+    amplitude = float(np.std(model))
+    return float(np.std(measured)) / amplitude if amplitude > 0.0 else 0.0
+
+
 def wrong_sign(run: str, channel: str, measured: Array, start: Array, fitted: Array) -> str | None:
-    """A channel that runs against the model, before the fit or after it."""
-    at_start, after = correlation(measured, start), correlation(measured, fitted)
-    if min(at_start, after) > OPPOSITE:
-        return None
-    when = "at the start values" if at_start <= after else "after the fit"
-    return (
-        f"{channel} of run {run} runs against the model (correlation {min(at_start, after):.2f} "
-        f"{when}); its sign is probably wrong: multiply it by -1."
-    )
+    """A channel that runs against the model, at the start values or after the fit.
+
+    A model that moves much more or less than the channel is no witness: it may have fallen over.
+    """
+    for model, when in ((start, "at the start values"), (fitted, "after the fit")):
+        opposed = correlation(measured, model)
+        if opposed < OPPOSITE and 1.0 / ALIKE < _amplitude_ratio(measured, model) < ALIKE:
+            return (
+                f"{channel} of run {run} runs against the model (correlation {opposed:.2f} {when});"
+                " its sign is probably wrong: multiply it by -1."
+            )
+    return None
 
 
 def wrong_unit(run: str, channel: str, measured: Array, start: Array) -> str | None:
     """A channel whose amplitude is a unit's factor away from the model's at the start values."""
-    amplitude = float(np.std(start))
-    ratio = float(np.std(measured)) / amplitude if amplitude > 0.0 else 0.0
+    ratio = _amplitude_ratio(measured, start)
     for expected, spread, numbers, header in UNIT_RATIOS[channel]:
         if expected / spread < ratio < expected * spread:
             return (
@@ -90,62 +101,99 @@ def poor_fit(run: str, channel: str, measured: Array, fitted: Array, noise: floa
     )
 
 
-def channel_findings(
+def channel_faults(
     observations: Sequence[Observation], start: Histories, fitted: Histories
-) -> list[str]:
-    """Findings about every compared channel; a wrong sign or unit explains a poor fit."""
-    found: list[str] = []
+) -> dict[tuple[str, str], list[str]]:
+    """By run and channel, sentences on a sign or unit that is probably wrong."""
+    found: dict[tuple[str, str], list[str]] = {}
     for seen in observations:
-        opposite = []
+        opposed = []
         for channel, measured in seen.measured.items():
             before, after = start[seen.name][channel], fitted[seen.name][channel]
             sign = wrong_sign(seen.name, channel, measured, before, after)
             unit = wrong_unit(seen.name, channel, measured, before)
-            opposite += [channel] if sign else []
-            explained = [sentence for sentence in (sign, unit) if sentence]
-            poor = poor_fit(seen.name, channel, measured, after, seen.noise[channel])
-            found += explained or ([poor] if poor else [])
-        if len(opposite) > 1 and len(opposite) == len(seen.measured):
-            found.append(
-                f"All compared channels of run {seen.name} run against the model; perhaps it is "
-                "the wheel.*.z that have the wrong sign."
+            opposed += [channel] if sign else []
+            if sign or unit:
+                found[seen.name, channel] = [one for one in (sign, unit) if one]
+        if len(opposed) > 1:
+            found[seen.name, opposed[-1]].append(
+                f"Since {' and '.join(opposed)} of run {seen.name} run against the model together, "
+                "it may rather be the wheel.*.z whose sign is wrong."
             )
     return found
 
 
-def parameter_findings(estimates: Sequence[ParameterEstimate], errors: Uncertainty) -> list[str]:
-    """Findings about parameters at a bound or not determined by the runs."""
-    found = []
+def poor_fits(
+    observations: Sequence[Observation],
+    fitted: Histories,
+    faults: Mapping[tuple[str, str], Sequence[str]],
+) -> list[str]:
+    """Channels followed badly for no fault already found."""
+    found = [
+        poor_fit(seen.name, channel, measured, fitted[seen.name][channel], seen.noise[channel])
+        for seen in observations
+        for channel, measured in seen.measured.items()
+        if (seen.name, channel) not in faults
+    ]
+    return [sentence for sentence in found if sentence]
+
+
+def bound_findings(estimates: Sequence[ParameterEstimate]) -> list[str]:
+    """Parameters at a bound."""
+    return [_at_bound(one) for one in estimates if one.at_bound]
+
+
+def undetermined_findings(estimates: Sequence[ParameterEstimate], errors: Uncertainty) -> list[str]:
+    """Parameters which the runs do not determine, grouped by what can be done about it."""
+    unexcited, confused, unknown = [], [], []
     for k, one in enumerate(estimates):
-        if one.at_bound:
-            side, bound = (
-                ("lower", one.lower)
-                if one.value - one.lower < one.upper - one.value
-                else ("upper", one.upper)
-            )
-            found.append(
-                f"{one.name} is at its {side} bound, {bound:.4g} {one.unit}; widen the bound or "
-                "fix the parameter."
-            )
-        elif one.determined == "no":
-            found.append(_undetermined(estimates, errors, k))
+        if one.at_bound or one.determined != "no":
+            continue
+        partner = _partner(errors, k)
+        if not _excited(one, errors, k):
+            unexcited.append(one.name)
+        elif partner is None:
+            unknown.append(one.name)
+        elif sorted([k, partner]) not in confused:
+            confused.append(sorted([k, partner]))
+    found = []
+    if unexcited:
+        remedy = "fix it" if len(unexcited) == 1 else "fix them"
+        found.append(
+            f"The runs do not excite {', '.join(unexcited)}; {remedy} or add a run that does."
+        )
+    for first, second in confused:
+        found.append(
+            f"The runs hardly tell {estimates[first].name} from {estimates[second].name}; fix one "
+            "of them or add a run that moves them differently."
+        )
+    if unknown:
+        found.append(
+            f"The runs leave {', '.join(unknown)} with a 95 % interval wider than half the value; "
+            "fix some of the parameters or measure more."
+        )
     return found
 
 
-def _undetermined(estimates: Sequence[ParameterEstimate], errors: Uncertainty, k: int) -> str:
-    one = estimates[k]
-    scale = max(abs(one.value), abs(one.start))
-    if not errors.alone[k] < UNEXCITED * scale:
-        return f"The runs do not excite {one.name}; fix it or add a run that does."
-    partners = np.abs(np.nan_to_num(errors.correlation[k], nan=1.0))
-    partners[k] = 0.0
-    nearest = int(np.argmax(partners))
-    if partners[nearest] > TOLD_APART:
-        return (
-            f"The runs hardly tell {one.name} from {estimates[nearest].name}; fix one of them or "
-            "add a run that moves them differently."
-        )
+def _at_bound(one: ParameterEstimate) -> str:
+    at_lower = one.value - one.lower < one.upper - one.value
+    side, bound = ("lower", one.lower) if at_lower else ("upper", one.upper)
     return (
-        f"The runs do not determine {one.name}: its 95 % interval is wider than half its value; "
-        "fix it or measure more."
+        f"{one.name} is at its {side} bound, {bound:.4g} {one.unit}; widen the bound or fix the "
+        "parameter."
     )
+
+
+def _excited(one: ParameterEstimate, errors: Uncertainty, k: int) -> bool:
+    """Whether the runs would determine the parameter if all others were known."""
+    return bool(errors.alone[k] < UNEXCITED * max(abs(one.value), abs(one.start)))
+
+
+def _partner(errors: Uncertainty, k: int) -> int | None:
+    """The parameter with which one is confused; those in an undetermined direction first."""
+    strength = np.abs(np.nan_to_num(errors.correlation[k], nan=0.0))
+    if np.isinf(errors.std_error[k]):
+        strength = np.where(np.isinf(errors.std_error), 1.0, 0.0)
+    strength[k] = 0.0
+    nearest = int(np.argmax(strength))
+    return nearest if strength[nearest] > TOLD_APART else None

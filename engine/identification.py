@@ -16,8 +16,8 @@ from scipy.optimize import least_squares
 from scipy.stats.qmc import Halton
 
 from .errors import ProblemError
-from .fit import Fit, FittedRun, Outcome, ParameterEstimate, Progress, determined
-from .fit_findings import channel_findings, parameter_findings
+from .fit import CONVERGED, Fit, FittedRun, Outcome, ParameterEstimate, Progress, determined
+from .fit_findings import bound_findings, channel_faults, poor_fits, undetermined_findings
 from .parameters import parameter
 from .problem import FreeParameter, Problem
 from .residuals import FAILED_TRIAL, Residuals, Simulate
@@ -30,6 +30,10 @@ __all__ = ["Fit", "FreeParameter", "Outcome", "Problem", "Progress", "identify"]
 Array = NDArray[np.float64]
 
 MOST_EVALUATIONS = 100
+EVALUATIONS_ON_A_FAULT = 40
+"""Trial points spent when a channel probably has the wrong sign or unit: enough should it turn out
+to be right, no more because a fit to the wrong one means nothing."""
+
 COST_TOLERANCE = 1e-8
 STEP_TOLERANCE = 1e-8
 GRADIENT_TOLERANCE = 1e-8
@@ -104,6 +108,7 @@ def identify(
     x_start = np.array([one.variable(one.start) for one in problem.free])
     x_start, moved = _usable_start(residuals, x_start)
     start = residuals.model(x_start)
+    at_start = channel_faults(problem.observations, start, start)
 
     search = _Search(residuals, progress)
     solution = least_squares(
@@ -115,7 +120,7 @@ def identify(
         ftol=COST_TOLERANCE,
         xtol=STEP_TOLERANCE,
         gtol=GRADIENT_TOLERANCE,
-        max_nfev=most_evaluations,
+        max_nfev=min(most_evaluations, EVALUATIONS_ON_A_FAULT) if at_start else most_evaluations,
     )
     r = residuals.vector(solution.x)
     places = [block.place for block in residuals.blocks()]
@@ -125,13 +130,17 @@ def identify(
     errors = uncertainty([(r[place], jacobian[place]) for place in places], scale)
     values = problem.values(solution.x)
     estimates = _estimates(problem, values, errors)
+    fitted = residuals.model(solution.x)
+    faults = channel_faults(problem.observations, start, fitted)
     warnings = [
         *(warning for seen in problem.observations for warning in seen.inputs.warnings),
         *moved,
-        *channel_findings(problem.observations, start, residuals.model(solution.x)),
-        *parameter_findings(estimates, errors),
+        *(sentence for sentences in faults.values() for sentence in sentences),
+        *poor_fits(problem.observations, fitted, faults),
+        *bound_findings(estimates),
+        *(undetermined_findings(estimates, errors) if not faults else []),
     ]
-    outcome = _outcome(solution.status, estimates, search)
+    outcome = Outcome.DOUBTFUL if faults else _outcome(solution.status, estimates, search)
     return Fit(
         vehicle=problem.vehicle_at(solution.x),
         parameters=estimates,
@@ -140,7 +149,7 @@ def identify(
         fit_percent=_percents(residuals, r),
         residuals=_histories(residuals, r),
         outcome=outcome,
-        converged=outcome not in (Outcome.ASTRAY, Outcome.BUDGET_SPENT, Outcome.STUCK),
+        converged=outcome in CONVERGED,
         warnings=tuple(dict.fromkeys(warnings)),
         seconds=time.perf_counter() - began,
         simulations=residuals.simulations,
@@ -160,12 +169,18 @@ def _usable_start(residuals: Residuals, x: Array) -> tuple[Array, list[str]]:
 
     Start values from which the model fails, or is further from the runs than their mean, can
     lie where the car falls over into another equilibrium, from which no small step leads out.
-    Then a Halton sequence of cars around them is tried and the best taken, if it is much better.
+    Unless a channel of wrong sign or unit is the reason, a Halton sequence of cars around them is
+    tried and the best taken, if it is much better.
     Raises ProblemError when the model fails on every one.
     """
     r = residuals.vector(x)
+    failed = bool(np.any(r == FAILED_TRIAL))
     if r @ r < residuals.scatter():
         return x, []
+    if not failed:
+        start = residuals.model(x)
+        if channel_faults(residuals.problem.observations, start, start):
+            return x, []
     reach = np.where([one.logarithmic for one in residuals.problem.free], 1.0, 2.0)
     lower = np.maximum(residuals.lower, x - reach)
     upper = np.minimum(residuals.upper, x + reach)
@@ -178,7 +193,7 @@ def _usable_start(residuals: Residuals, x: Array) -> tuple[Array, list[str]]:
             "The start values do not carry the car through the runs, so the fit began from others "
             "near them; check the start values."
         ]
-    if np.any(r == FAILED_TRIAL):
+    if failed:
         raise ProblemError(_failure(residuals.problem))
     return x, []
 
