@@ -38,7 +38,12 @@ VARIES = 0.2
 
 def check_recording(run: Run) -> list[str]:
     """Findings about one run that has the channels of the rims mode."""
-    return [*_gaps(run), *_rest_values(run), *_acceleration_against_speed(run)]
+    return [
+        *_gaps(run),
+        *_rest_values(run),
+        *_acceleration_against_speed(run),
+        *_one_wheel_turned_over(run),
+    ]
 
 
 def _gaps(run: Run) -> list[str]:
@@ -96,3 +101,30 @@ def _acceleration_against_speed(run: Run) -> list[str]:
             "check the units of both."
         ]
     return []
+
+
+def _one_wheel_turned_over(run: Run) -> list[str]:
+    """An axle whose wheels go against each other while those of the other go together.
+
+    Below 1 Hz a road lifts left and right alike; a rig that rolls or warps the car turns both
+    axles.
+    """
+    wheels = [f"wheel.{corner}.z" for corner in CORNERS]
+    if too_coarse(float(np.mean(np.diff(run.time))), SLOW):
+        return []
+    slow = low_pass(run.time, np.column_stack([run[name] for name in wheels]), SLOW)
+    slow = slow - slow.mean(axis=0)
+    size = np.linalg.norm(slow, axis=0)
+    if np.any(size == 0.0):
+        return []
+    together = [
+        float(slow[:, left] @ slow[:, left + 1]) / (size[left] * size[left + 1]) for left in (0, 2)
+    ]
+    axle = int(np.argmin(together))
+    if together[axle] > -0.5 or together[1 - axle] < 0.5:
+        return []
+    first, second = wheels[2 * axle : 2 * axle + 2]
+    return [
+        f"In run {run.name} {first} and {second} run against each other while the other axle's "
+        "wheels go together; one of them has the wrong sign: multiply it by -1."
+    ]

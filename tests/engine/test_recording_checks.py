@@ -53,3 +53,17 @@ def test_a_hole_in_the_record_is_found_with_its_place():
     time = np.concatenate([np.arange(0.0, 4.0, 0.005), np.arange(4.8, 10.0, 0.005)])
     [finding] = check_recording(run(time))
     assert "between 3.99 and 4.80 s" in finding or "between 4.00 and 4.80 s" in finding
+
+
+def test_one_wheel_turned_over_is_found_by_its_neighbour():
+    road = 0.02 * np.sin(2.0 * TIME)
+    wheels = {name: road for name in INPUT_CHANNELS if name.startswith("wheel")}
+    assert check_recording(run(**wheels)) == []
+    [finding] = check_recording(run(**{**wheels, "wheel.rl.z": -road}))
+    assert "wheel.rl.z and wheel.rr.z" in finding
+
+
+def test_a_rig_that_rolls_the_car_turns_no_wheel_over():
+    road = 0.02 * np.sin(2.0 * TIME)
+    left = {"wheel.fl.z": road, "wheel.rl.z": road}
+    assert check_recording(run(**left, **{"wheel.fr.z": -road, "wheel.rr.z": -road})) == []
