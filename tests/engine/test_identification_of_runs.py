@@ -1,0 +1,220 @@
+"""Identification with the real model: twins whose truth is known, and the detailed car."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ridetune.engine.campaign import drive_campaign
+from ridetune.engine.fit import Outcome
+from ridetune.engine.identification import Problem, identify
+from ridetune.engine.measurement import read_run
+from ridetune.engine.parameters import PARAMETER_NAMES, PARAMETERS
+from ridetune.engine.problem import DEFAULT_NOISE
+from ridetune.engine.residuals import Residuals
+from ridetune.engine.rims import WHEEL_CHANNELS
+from ridetune.engine.simulation import rims_batch, simulate_rims
+from ridetune.engine.uncertainty import uncertainty
+from ridetune.engine.vehicle_file import read_vehicle
+from scipy.stats import chi2
+
+from ..factories import paper_vehicle
+
+CAR = paper_vehicle()
+SAMPLES = Path(__file__).parents[2] / "sample_runs"
+OFF = (1.25, 0.7, 0.8, 1.3, 0.7, 0.7, 1.5, 1.5, 0.75, 1.4, 1.35, 0.6)
+ELSEWHERE = {
+    name: factor * CAR.value(name) for name, factor in zip(PARAMETER_NAMES, OFF, strict=True)
+}
+SPRINGS_AND_DAMPERS = {row.name for row in PARAMETERS if row.symbol in ("K_F", "C_F", "K_R", "C_R")}
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    """Both manoeuvres of Table 2 driven directly, sampled every 5 ms, without noise."""
+    return drive_campaign(CAR)
+
+
+@pytest.fixture(scope="module")
+def detailed():
+    """The detailed car's known data and its two runs."""
+    vehicle = read_vehicle(SAMPLES / "detailed_vehicle.json")
+    return vehicle, *(read_run(SAMPLES / f"detailed_manoeuvre_{k}.csv") for k in (1, 2))
+
+
+def errors_in_percent(fit):
+    return {one.name: 100 * (one.value / CAR.value(one.name) - 1) for one in fit.parameters}
+
+
+def with_channels(run, factor, *names):
+    return replace(run, channels={**run.channels, **{name: factor * run[name] for name in names}})
+
+
+def test_a_noise_free_twin_returns_all_twelve_parameters(campaign):
+    """Oracle: the truth. What is left comes from the 20 Hz filter of a_x and its kinks where the
+    torque begins and ends; docs/identification.md measures it below 0.08 % for this filter."""
+    fit = identify(Problem.build(CAR, campaign, start=ELSEWHERE))
+    assert max(map(abs, errors_in_percent(fit).values())) < 0.1
+    assert fit.outcome == Outcome.DETERMINED
+    assert not fit.warnings
+
+
+def test_the_paper_s_traction_biases_stiffness_and_bar(campaign):
+    """Published bias of the paper's Eq. 3/4 on noise-free twins: 1-3 % in K_R, tens of percent in
+    Ktor_F, at a residual of some 20 um (0.04 of the noise of z)."""
+    fit = identify(Problem.build(CAR, campaign, traction="paper"))
+    off = errors_in_percent(fit)
+    assert 1.0 < abs(off["rear.suspension.stiffness"]) < 3.0
+    assert abs(off["front.stabilizer_bar.stiffness"]) > 20.0
+    assert np.sqrt(2 * fit.cost / 24000) < 0.1
+
+
+def test_a_start_where_the_car_falls_over_is_left(campaign):
+    """A soft rear on short arms tips the car into another equilibrium as it pulls away. Oracle:
+    the truth."""
+    falling = {
+        **ELSEWHERE,
+        "rear.suspension.stiffness": 12900.0,
+        "rear.pivot.distance": 0.69,
+        "rear.pivot.angle": 0.14,
+    }
+    fit = identify(Problem.build(CAR, campaign, start=falling))
+    assert "the fit began from others" in " ".join(fit.warnings)
+    assert max(map(abs, errors_in_percent(fit).values())) < 0.1
+
+
+def test_errors_of_the_linearised_fit_follow_the_stated_covariance(campaign):
+    """Oracle: for a linear fit with white noise, e^T C^-1 e is chi-square of 12 degrees of
+    freedom. The model is linearised at the truth; 60 noise realisations, mean within 4 standard
+    deviations (sqrt(24 / 60)), plus 10 % for the errors' own scatter."""
+    problem = Problem.build(CAR, campaign)
+    residuals = Residuals(problem, rims_batch)
+    x = np.array([one.variable(one.start) for one in problem.free])
+    jacobian = residuals.jacobian(x)
+    places = [block.place for block in residuals.blocks()]
+    bread = np.linalg.inv(jacobian.T @ jacobian)
+    rng = np.random.default_rng(11)
+    distances = []
+    for _ in range(60):
+        noise = rng.normal(size=len(jacobian))
+        error = bread @ jacobian.T @ noise
+        left = noise - jacobian @ error
+        found = uncertainty([(left[place], jacobian[place]) for place in places], np.ones(12))
+        covariance = found.correlation * np.outer(found.std_error, found.std_error)
+        distances.append(error @ np.linalg.solve(covariance, error))
+    assert np.mean(distances) == pytest.approx(12.0, abs=4 * np.sqrt(24 / 60) + 1.2)
+
+
+def test_noisy_outputs_leave_springs_and_dampers_determined():
+    """Oracle: the truth within the joint 99.9 % region of the reported errors; the paper's
+    campaign determines K and C and, at this noise, not every pivot and bar (Cramer-Rao)."""
+    runs = drive_campaign(CAR, noise=DEFAULT_NOISE, seed=21)
+    fit = identify(Problem.build(CAR, runs, start=ELSEWHERE))
+    errors = np.array([one.value - CAR.value(one.name) for one in fit.parameters])
+    deviations = np.array([one.std_error for one in fit.parameters])
+    covariance = fit.correlation * np.outer(deviations, deviations)
+    assert errors @ np.linalg.solve(covariance, errors) < chi2.ppf(0.999, 12)
+    for one in fit.parameters:
+        if one.name in SPRINGS_AND_DAMPERS:
+            assert one.determined == "yes"
+    assert {one.determined for one in fit.parameters} != {"yes"}
+    assert fit.outcome in (Outcome.WEAKLY, Outcome.UNDETERMINED)
+    bars = [one.name for one in fit.parameters].index("front.stabilizer_bar.stiffness")
+    pivot = [one.name for one in fit.parameters].index("front.pivot.distance")
+    assert fit.correlation[bars, pivot] > 0.99
+
+
+def test_a_symmetric_run_does_not_excite_the_bars(campaign):
+    """Oracle: symmetry. Left and right wheels moving together never twist a bar, so both bars'
+    stiffness and damping are undetermined, and infinitely so."""
+    run = campaign[1]
+    means = {
+        name: 0.5 * (run[f"wheel.{axle}l.z"] + run[f"wheel.{axle}r.z"])
+        for axle in "fr"
+        for name in (f"wheel.{axle}l.z", f"wheel.{axle}r.z")
+    }
+    symmetric = replace(run, channels={**run.channels, **means})
+    driven = simulate_rims(CAR, symmetric).run
+    outputs = {name: driven[name] for name in ("chassis.z", "chassis.pitch")}
+    twin = replace(run, channels={**symmetric.channels, **outputs})
+    problem = Problem.build(CAR, [twin], outputs=["chassis.z", "chassis.pitch"])
+    fit = identify(problem)
+    bars = [one for one in fit.parameters if "stabilizer_bar" in one.name]
+    assert all(np.isinf(one.std_error) and one.determined == "no" for one in bars)
+    assert fit.outcome == Outcome.UNDETERMINED
+    [warning] = [sentence for sentence in fit.warnings if "do not excite" in sentence]
+    assert all(one.name in warning for one in bars)
+
+
+def test_a_subset_of_channels_and_unequal_sampling_still_find_the_truth(campaign):
+    """Oracle: the truth. Every third sample dropped at random, and no roll in the second run; the
+    springs and dampers stay within 0.5 %, the bars are held."""
+    rng = np.random.default_rng(12)
+    runs = []
+    for run in campaign:
+        kept = np.sort(rng.choice(len(run.time), size=len(run.time) * 2 // 3, replace=False))
+        kept[[0, -1]] = 0, len(run.time) - 1
+        channels = {name: run[name][kept] for name in run.columns}
+        runs.append(replace(run, time=run.time[kept], channels=channels))
+    problem = Problem.build(
+        CAR,
+        runs,
+        free=SPRINGS_AND_DAMPERS,
+        start={name: ELSEWHERE[name] for name in SPRINGS_AND_DAMPERS},
+        outputs={"manoeuvre_2": ["chassis.z", "chassis.pitch"]},
+    )
+    fit = identify(problem)
+    assert max(map(abs, errors_in_percent(fit).values())) < 0.5
+
+
+@pytest.mark.parametrize("channel", ["chassis.z", "chassis.pitch", "chassis.roll"])
+def test_a_channel_of_the_wrong_sign_is_named_even_when_the_fit_goes_astray(detailed, channel):
+    vehicle, run, _ = detailed
+    fit = identify(Problem.build(vehicle, [with_channels(run, -1.0, channel)]), most_evaluations=5)
+    [named] = [sentence for sentence in fit.warnings if "multiply it by -1" in sentence]
+    assert channel in named
+    assert run.name in named
+    assert fit.outcome == Outcome.DOUBTFUL
+    assert not fit.converged
+
+
+def test_wheels_of_the_wrong_sign_are_suspected(detailed):
+    vehicle, run, _ = detailed
+    turned = with_channels(run, -1.0, *WHEEL_CHANNELS)
+    fit = identify(Problem.build(vehicle, [turned]), most_evaluations=5)
+    assert "wheel.*.z" in " ".join(fit.warnings)
+
+
+@pytest.mark.parametrize(
+    ("channel", "factor", "unit"),
+    [("chassis.z", 1e3, "mm"), ("chassis.pitch", 57.3, "deg"), ("chassis.roll", 57.3, "deg")],
+)
+def test_a_channel_in_the_wrong_unit_is_named(detailed, channel, factor, unit):
+    vehicle, run, _ = detailed
+    fit = identify(
+        Problem.build(vehicle, [with_channels(run, factor, channel)]), most_evaluations=5
+    )
+    [named] = [sentence for sentence in fit.warnings if "correct the header" in sentence]
+    assert channel in named
+    assert f"in {unit} " in named
+
+
+def test_the_detailed_car_is_identified_and_predicted(detailed):
+    """Oracle: an independent multibody model with 164 degrees of freedom. Fit percents on a run
+    the fit has not seen, as a study with a concept model of its own found them less 3, 2 and 9;
+    a linear damper cannot follow the detailed car's bars."""
+    vehicle, seen, unseen = detailed
+    fit = identify(Problem.build(vehicle, [seen]))
+    assert fit.converged
+    assert fit.outcome == Outcome.AT_BOUND
+    for one in fit.parameters:
+        if one.at_bound:
+            assert one.determined == "no"
+            assert any(one.name in sentence for sentence in fit.warnings)
+    verdicts = {one.name: one.determined for one in fit.parameters}
+    assert verdicts["rear.stabilizer_bar.stiffness"] == "no"
+    assert {verdicts[name] for name in SPRINGS_AND_DAMPERS} == {"yes"}
+    predicted = simulate_rims(fit.vehicle, unseen).fit_percent
+    assert predicted["chassis.z"] >= 63.0
+    assert predicted["chassis.pitch"] >= 85.0
+    assert predicted["chassis.roll"] >= 60.0
