@@ -18,6 +18,7 @@ from .errors import ServiceError
 log = logging.getLogger(__name__)
 
 MEDIA_TYPE = "application/problem+json"
+CODES = {400: "bad-request", 404: "not-found", 405: "method-not-allowed", 413: "too-large"}
 
 
 def problem(
@@ -62,7 +63,7 @@ def reply_to_errors(app: FastAPI) -> None:
 
     @app.exception_handler(HTTPException)
     async def http_error(_: Request, error: HTTPException) -> JSONResponse:
-        code = HTTPStatus(error.status_code).phrase.lower().replace(" ", "-")
+        code = CODES.get(error.status_code, "http")
         detail = str(error.detail).rstrip(".") + "."
         if error.status_code == 404:
             detail = "There is nothing at this address; see /api/openapi.json for what there is."

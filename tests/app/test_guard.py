@@ -73,4 +73,5 @@ def test_a_long_body_is_refused_with_its_limit(small_limits):
         for reply in (announced, counted):
             assert reply.status_code == 413
             assert reply.headers["content-type"] == "application/problem+json"
+            assert reply.json()["code"] == "too-large"
             assert "0.01 MB" in reply.json()["detail"]
