@@ -23,8 +23,8 @@ export function useSession(id) {
   base = `/api/sessions/${encodeURIComponent(id)}`;
 }
 
-async function call(method, url, { body, accept = "application/json", signal } = {}) {
-  const init = { method, headers: { Accept: accept }, signal };
+async function call(method, url, { body, accept = "application/json", keepalive = false } = {}) {
+  const init = { method, headers: { Accept: accept }, keepalive };
   if (body instanceof FormData) init.body = body;
   else if (body !== undefined) {
     init.body = JSON.stringify(body);
@@ -33,8 +33,7 @@ async function call(method, url, { body, accept = "application/json", signal } =
   let reply;
   try {
     reply = await fetch(url, init);
-  } catch (error) {
-    if (error.name === "AbortError") throw error;
+  } catch {
     throw new Refusal({ title: "No connection", detail: "The service does not answer." });
   }
   if (!reply.ok) throw await refusal(reply);
@@ -94,7 +93,9 @@ export const roads = () => json("GET", "/api/roads");
 
 // The session
 export const session = () => json("GET", base);
-export const saveVehicle = (vehicle) => json("PUT", `${base}/vehicle`, { body: vehicle });
+/** Outlives the page, so that leaving it does not lose the last move. */
+export const saveVehicle = (vehicle) =>
+  json("PUT", `${base}/vehicle`, { body: vehicle, keepalive: true });
 export const saveBaseline = (vehicle) => json("PUT", `${base}/baseline`, { body: vehicle });
 export const simulate = (body) =>
   frames("POST", `${base}/simulations`, { body, accept: FRAMES });

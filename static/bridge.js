@@ -66,6 +66,10 @@
     get ready() {
       return socket !== null;
     },
+    /** Connect anew at once instead of at the next try. */
+    retry() {
+      socket?.postMessage({ type: "retry" });
+    },
     inject(messages) {
       if (!socket) return false;
       // Typed arrays must be of this window's own kind, or three.js does not know them.

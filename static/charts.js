@@ -166,9 +166,9 @@ function fill() {
   for (const entry of charts) {
     const { name, spectrum, plot, box, factor } = entry;
     const channel = name.replace(SPECTRUM, "");
-    const lines = runs.map((run) => run?.values[channel] ?? null);
+    const data = runs.map((run) => run?.values[channel] ?? null);
     const empty = box.querySelector(".chart-empty");
-    empty.hidden = !base || lines.some(Boolean);
+    empty.hidden = !base || data.some(Boolean);
     empty.textContent = base?.head.mode === "rims" && channel.startsWith("tyre.")
       ? "Not in this ride: with measured rims the tyres play no part. Choose a manoeuvre."
       : "Not in this ride.";
@@ -178,7 +178,7 @@ function fill() {
     }
     const x = base ? base.time : [];
     plot.batch(() => {
-      plot.setData([x, ...runs.map((run, i) => onGrid(run, lines[i], base, factor))], false);
+      plot.setData([x, ...runs.map((run, i) => onGrid(run, data[i], base, factor))], false);
       const [min, max] = zoom ?? [x[0] ?? 0, x[x.length - 1] ?? 1];
       plot.setScale("x", { min, max });
     });
@@ -202,12 +202,25 @@ function fillSpectrum({ plot, factor }, runs, channel) {
   ]);
 }
 
+/** Lines on the shown grid, kept per run: a slider changes one run of three. */
+const lines = new WeakMap();
+
 function onGrid(run, values, base, factor) {
   if (!values) return Array(base ? base.time.length : 0).fill(null);
-  const same = run.time.length === base.time.length &&
-    Math.abs(run.time[1] - base.time[1]) < 1e-6 && run.time[0] === base.time[0];
+  const kept = lines.get(values);
+  if (kept && sameGrid(kept.base, base)) return kept.line;
+  const line = resampled(run, values, base, factor);
+  lines.set(values, { base, line });
+  return line;
+}
+
+const sameGrid = (a, b) =>
+  a === b || (a.time.length === b.time.length && a.time[0] === b.time[0] &&
+    a.time[1] === b.time[1] && a.time[a.time.length - 1] === b.time[b.time.length - 1]);
+
+function resampled(run, values, base, factor) {
   const shown = (v) => (Number.isFinite(v) ? v * factor : null);
-  if (same) return Array.from(values, shown);
+  if (sameGrid(run, base)) return Array.from(values, shown);
   const last = run.time[run.time.length - 1];
   return Array.from(base.time, (t) => {
     if (t < run.time[0] - 1e-6 || t > last + 1e-6) return null;

@@ -5,7 +5,7 @@
 //
 // For the browser tests `window.ridetune` looks inside: state(key) of the store, timing (ms from a
 // slider's move to new charts), scene (connected, built, poses, last messages), drawn() (what each
-// chart shows), zoomed(), clock and job().
+// chart shows), zoomed(), clock, job(), idle() (no simulation under way) and unsaved().
 
 import * as api from "./api.js";
 import * as car from "./car.js";
@@ -18,16 +18,17 @@ import * as measurements from "./measurements.js";
 import { banner, notice, refused } from "./notices.js";
 import * as ride from "./ride.js";
 import * as scene from "./scene.js";
-import { timing, want } from "./simulation.js";
+import { idle, timing, want } from "./simulation.js";
 import { get, on, set } from "./store.js";
 import * as timeline from "./timeline.js";
 import * as units from "./units.js";
 
 const RETRY = 1500;
-const SAVE_AFTER = 800;
+const SAVE_AFTER = 400;
 
 const sid = location.pathname.split("/")[2];
 let unsaved = false;
+let saving = false;
 
 async function start() {
   api.useSession(sid);
@@ -104,11 +105,11 @@ function settle() {
       set({ online: state !== null });
       banner(
         state
-          ? `${state.message || "The service is compiling the car model for this machine."} ` +
-            "This happens at the first start only; the page goes on by itself."
+          ? state.state === "compiling" ? `${state.message} The page goes on by itself.`
+            : state.message
           : "The service does not answer. Your car and files are kept; the page goes on as soon " +
             "as it is back.",
-        state ? "calm" : "lost");
+        state?.state === "compiling" ? "calm" : "lost");
       await new Promise((done) => setTimeout(done, RETRY));
     }
     banner("");
@@ -125,14 +126,17 @@ function settle() {
 async function save() {
   if (!unsaved) return;
   unsaved = false;
+  saving = true;
   try {
     await api.saveVehicle(controls.withValues(get("vehicle"), get("values")));
   } catch (error) {
     unsaved = true;
     if (error.lost) set({ online: false });
   }
+  saving = false;
 }
 const saveSoon = debounced(save, SAVE_AFTER);
+window.addEventListener("pagehide", save);
 
 async function setBaseline() {
   const vehicle = controls.withValues(get("vehicle"), get("values"));
@@ -149,6 +153,7 @@ async function setBaseline() {
 function applyFit(result) {
   set({ values: { ...get("values"),
     ...Object.fromEntries(result.parameters.map(({ name, value }) => [name, value])) } });
+  save();
   notice("info", "The sliders hold the identified car",
     "“Set baseline” makes it the car that later changes are compared with.");
 }
@@ -210,7 +215,7 @@ function lost(error) {
 
 window.ridetune = {
   state: get, timing, scene: scene.seen, drawn: charts.drawn, zoomed: charts.zoomed,
-  clock: timeline.clock, job: identification.current,
+  clock: timeline.clock, job: identification.current, idle, unsaved: () => unsaved || saving,
 };
 
 start().catch(lost);

@@ -23,7 +23,7 @@ let shownGhost = null;
 let waiting = 0;
 const scales = new Map();
 /** What the browser tests look at. */
-export const seen = { connected: false, built: false, poses: 0, last: [] };
+export const seen = { connected: false, connections: 0, built: false, poses: 0, last: [] };
 
 /** Open the view of a session. `askForCar` makes the service send the nodes once more. */
 export function build(sid, { askForCar }) {
@@ -46,6 +46,7 @@ export function build(sid, { askForCar }) {
       } else askForCar();
     } else {
       seen.connected = detail.state === "connected";
+      seen.connections += seen.connected;
       seen.built = false;
       if (!seen.connected) note("The 3D view has lost its connection and is trying again.");
     }
@@ -65,6 +66,9 @@ export function build(sid, { askForCar }) {
   $("#ghost").addEventListener("change", refresh);
   onTime(place);
   on("now reference measured ride compare", refresh);
+  on("online", (state) => {
+    if (state.online && !seen.connected) frame.contentWindow?.bridge?.retry();
+  });
 }
 
 function note(text) {

@@ -16,6 +16,9 @@ let sequence = 0;
 /** Milliseconds from the newest wish to its charts, for the status line and the tests. */
 export const timing = { asked: 0, shown: [] };
 
+/** Nothing is under way and nothing is wanted. */
+export const idle = () => !running;
+
 /** Ask for runs: "now", "reference", "measured"; `scene` also sends the car's nodes. */
 export function want(...names) {
   if (names.includes("now") && !wanted.now) timing.asked = performance.now();

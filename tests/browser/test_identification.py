@@ -1,0 +1,124 @@
+"""From a measured ride to an identified car, on the page."""
+
+import numpy as np
+import pytest
+
+from .conftest import short_run
+
+pytestmark = pytest.mark.browser
+
+
+def add_file(visitor, name, data):
+    visitor.page.set_input_files("#file", [{"name": name, "mimeType": "text/csv", "buffer": data}])
+
+
+def free_only(visitor, *symbols):
+    """Leave these parameters free and fix the others."""
+    visitor.click("#identification >> text=Set-up")
+    for row in visitor.element(".free tbody tr").all():
+        symbol = row.locator(".symbol").inner_text().replace("\n", "")
+        if symbol not in symbols:
+            row.locator("input[type=checkbox]").uncheck()
+
+
+def fit_of(visitor, channel):
+    return visitor.look(f"ridetune.state('now').head.fit_percent['{channel}']")
+
+
+def test_a_newcomer_identifies_the_sample_car_and_applies_it(visitor):
+    """Open, press Identify, apply: the charts move towards the measurement."""
+    before, worse = visitor.line("chassis.pitch"), fit_of(visitor, "chassis.pitch")
+    visitor.click("#identify")
+    visitor.until("ridetune.state('fit') !== null", 150)
+    assert visitor.element("#identification").is_visible()
+    assert len(visitor.element(".estimates tbody tr").all()) == 12
+
+    visitor.click("#apply")
+    visitor.settled()
+    identified = visitor.look("ridetune.job().result.vehicle.front.suspension.stiffness")
+    assert visitor.value("front.suspension.stiffness") == identified
+    assert np.abs(visitor.line("chassis.pitch") - before).max() > 0.01
+    assert fit_of(visitor, "chassis.pitch") > worse
+    np.testing.assert_array_equal(visitor.line("chassis.pitch", "reference"), before)
+
+    # Error bars beside the sliders, and a score on the run that was held out.
+    assert visitor.element("#parameters .spread").first.inner_text().startswith("±")
+    visitor.until("document.querySelectorAll('.held-out td').length > 0")
+    visitor.wait(
+        lambda: "…" not in visitor.element(".held-out").inner_text(), "the held-out run is scored"
+    )
+
+    # What was found is still there when the page is opened again.
+    visitor.wait(lambda: not visitor.look("ridetune.unsaved()"), "the sliders are saved")
+    visitor.page.reload()
+    visitor.wait_until_drawn()
+    assert visitor.value("front.suspension.stiffness") == identified
+    visitor.until("ridetune.state('fit') !== null")
+
+
+def test_an_uploaded_file_is_identified(visitor):
+    visitor.click("#tab-measurements")
+    add_file(visitor, "my_ride.csv", short_run())
+    visitor.until("ridetune.state('measurements').length === 3")
+    assert "my_ride.csv" in visitor.element(".measurement-detail").inner_text()
+
+    visitor.click("#tab-identification")
+    for name, role in (("detailed_manoeuvre_1.csv", "no"), ("my_ride.csv", "fit")):
+        visitor.page.get_by_label(f"Use of {name}").select_option(role)
+    free_only(visitor, "KF", "CF", "KR", "CR")
+    visitor.click("#start")
+    visitor.until("ridetune.state('fit') !== null", 120)
+    assert visitor.look("ridetune.job().runs.map(({ name }) => name)") == ["my_ride.csv"]
+    estimates = visitor.element(".estimates tbody tr").all()
+    assert len(estimates) == 4
+    assert all("…" in row.inner_text() for row in estimates)
+
+
+def test_an_identification_is_cancelled(visitor):
+    visitor.click("#identify")
+    visitor.click("#cancel")
+    visitor.until("ridetune.job().state === 'cancelled'", 30)
+    assert visitor.element("#outcome").inner_text() == "Cancelled"
+    assert visitor.element("#identify").is_enabled()
+    assert visitor.look("ridetune.state('fit')") is None
+
+
+def test_a_file_that_is_no_measurement_is_explained_and_nothing_is_lost(visitor):
+    visitor.expect("status of 422")
+    visitor.click("#tab-measurements")
+    add_file(visitor, "picture.csv", bytes(range(256)) * 40)
+    visitor.wait(lambda: visitor.element(".problem").is_visible(), "the refusal is shown")
+    text = visitor.element(".problem").inner_text()
+    assert "picture.csv" in text
+    assert "export the recording as CSV" in text
+    assert visitor.look("ridetune.state('measurements').length") == 2
+
+
+def test_a_dropped_file_is_taken_anywhere_on_the_page(visitor):
+    visitor.page.evaluate(
+        """(text) => {
+            const data = new DataTransfer();
+            data.items.add(new File([text], "dropped.csv", { type: "text/csv" }));
+            const target = document.querySelector("#charts");
+            for (const kind of ["dragenter", "dragover", "drop"]) {
+                const event = new DragEvent(kind, { dataTransfer: data, bubbles: true,
+                    cancelable: true });
+                target.dispatchEvent(event);
+            }
+        }""",
+        short_run(60).decode(),
+    )
+    visitor.until("ridetune.state('measurements').some(({ name }) => name === 'dropped.csv')")
+    assert visitor.element("#measurements").is_visible()
+
+
+def test_without_a_measurement_the_page_says_what_to_do(visitor):
+    visitor.click("#tab-measurements")
+    for left in (1, 0):
+        visitor.click(".measurement-detail button.danger")
+        visitor.click(".measurement-detail button.danger")
+        visitor.until(f"ridetune.state('measurements').length === {left}")
+    assert "Add a CSV file" in visitor.element("#measurements").inner_text()
+    visitor.until("ridetune.state('ride').kind === 'manoeuvre' && ridetune.state('now') !== null")
+    visitor.click("#identify")
+    assert "at least one measured run" in visitor.element("#notices").inner_text()

@@ -1,0 +1,264 @@
+"""Tuning on the page: sliders, charts, 3D, keys, and what happens when things go away."""
+
+import signal
+
+import numpy as np
+import pytest
+
+from .conftest import Service, changed_pixels
+
+pytestmark = pytest.mark.browser
+
+STIFFNESS = "front.suspension.stiffness"
+AWAY = (
+    "ERR_CONNECTION_REFUSED",
+    "ERR_CONNECTION_RESET",
+    "WebSocket connection",
+    "ERR_EMPTY_RESPONSE",
+    "status of 503",
+)
+
+
+def press(visitor, selector, *keys):
+    visitor.element(selector).focus()
+    for key in keys:
+        visitor.page.keyboard.press(key)
+
+
+def position(visitor, node):
+    """Where the last pose put a node."""
+    found = visitor.look(
+        f"ridetune.scene.last.find((m) => m.name === '{node}' && m.position)?.position"
+    )
+    return np.array(found)
+
+
+def seek(visitor, time):
+    visitor.page.evaluate(
+        """(time) => { const slider = document.querySelector("#time"); slider.value = time;
+            slider.dispatchEvent(new Event("input")); }""",
+        time,
+    )
+
+
+def test_a_slider_moves_charts_and_car(visitor):
+    seek(visitor, 6.0)
+    before, body = visitor.line("chassis.pitch"), position(visitor, "/car/body")
+    press(visitor, "#slider-rear-suspension-stiffness", *["PageUp"] * 4)
+    visitor.settled()
+    assert visitor.value("rear.suspension.stiffness") == pytest.approx(28e3)
+    assert np.abs(visitor.line("chassis.pitch") - before).max() > 0.01
+    assert np.abs(position(visitor, "/car/body") - body).max() > 1e-5
+    # The compared car stays where it was, and one press brings the slider back to it.
+    np.testing.assert_array_equal(visitor.line("chassis.pitch", "reference"), before)
+    visitor.click("#reset-all")
+    visitor.settled()
+    np.testing.assert_array_equal(visitor.line("chassis.pitch"), before)
+
+
+def test_the_pivot_moves_in_3d(visitor):
+    before = visitor.picture()
+    press(visitor, "#slider-front-pivot-distance", *["PageUp"] * 5)
+    visitor.settled()
+    assert changed_pixels(visitor.picture(), before) > 5e-4
+
+
+def test_playing_moves_the_picture_and_pausing_holds_it(visitor):
+    visitor.page.select_option("#ride", "manoeuvre 2")
+    visitor.until("ridetune.state('now') && ridetune.state('now').head.mode === 'road'")
+    seek(visitor, 12.0)
+    here = visitor.picture()
+    assert changed_pixels(visitor.picture(), here) == 0.0
+    seek(visitor, 12.6)
+    assert changed_pixels(visitor.picture(), here) > 5e-4
+    visitor.click("#play")
+    visitor.until("ridetune.clock.time > 12.8")
+    visitor.click("#play")
+    stopped = visitor.look("ridetune.clock.time")
+    visitor.page.wait_for_timeout(300)
+    assert visitor.look("ridetune.clock.time") == stopped
+
+
+def test_charts_zoom_together_and_show_all_again(visitor):
+    box = visitor.element(".chart .u-over").first.bounding_box()
+    mouse, middle = visitor.page.mouse, box["y"] + box["height"] / 2
+    mouse.move(box["x"] + 0.5 * box["width"], middle)
+    mouse.down()
+    mouse.move(box["x"] + 0.75 * box["width"], middle, steps=5)
+    mouse.up()
+    visitor.until("ridetune.zoomed() !== null")
+    low, high = visitor.look("ridetune.zoomed()")
+    assert low == pytest.approx(10.0, abs=0.3)
+    assert high == pytest.approx(15.0, abs=0.3)
+    press(visitor, f"#slider-{STIFFNESS.replace('.', '-')}", "ArrowRight")
+    visitor.settled()
+    assert visitor.look("ridetune.zoomed()") == [low, high]
+    mouse.click(box["x"] + 0.5 * box["width"], middle)
+    assert visitor.look("ridetune.clock.time") == pytest.approx(12.5, abs=0.2)
+    mouse.dblclick(box["x"] + 0.3 * box["width"], middle)
+    visitor.until("ridetune.zoomed() === null")
+
+
+def test_a_manoeuvre_on_another_road_has_tyre_loads_and_numbers(visitor):
+    visitor.page.select_option("#ride", "manoeuvre constant-speed-c")
+    visitor.click("#charts-tyre")
+    visitor.settled()
+    rough = visitor.line("tyre.fl.load")
+    assert np.isfinite(rough).all()
+    visitor.page.select_option("#road", label="ISO 8608 class A")
+    visitor.settled()
+    smooth = visitor.line("tyre.fl.load")
+    assert smooth.std() < 0.5 * rough.std()
+    assert "Baseline" in visitor.element(".metrics").inner_text()
+
+
+def test_the_seven_dof_model_shows_what_the_arms_add(visitor):
+    """Without trailing arms and longitudinal coupling the car does not squat."""
+    visitor.page.select_option("#ride", "manoeuvre 2")
+    visitor.page.select_option("#compare", "7dof")
+    visitor.settled()
+    squat = slice(700, 1000)
+    assert visitor.line("chassis.pitch")[squat].mean() < -0.3
+    assert abs(visitor.line("chassis.pitch", "reference")[squat].mean()) < 0.1
+
+
+def test_keys_play_scrub_and_leave_fields_alone(visitor):
+    keyboard = visitor.page.keyboard
+    visitor.element("body").press("ArrowRight")
+    assert visitor.look("ridetune.clock.time") == pytest.approx(0.1)
+    keyboard.press("Shift+ArrowRight")
+    assert visitor.look("ridetune.clock.time") == pytest.approx(1.1)
+    keyboard.press("End")
+    assert visitor.look("ridetune.clock.time") == pytest.approx(20.0, abs=0.01)
+    keyboard.press("Home")
+    keyboard.press("Space")
+    visitor.until("ridetune.clock.playing && ridetune.clock.time > 0")
+    keyboard.press("Space")
+    assert not visitor.look("ridetune.clock.playing")
+    # A slider's arrows are its own, a field's keys too.
+    time = visitor.look("ridetune.clock.time")
+    before = visitor.value(STIFFNESS)
+    press(visitor, "#slider-front-suspension-stiffness", "ArrowRight")
+    assert visitor.value(STIFFNESS) == pytest.approx(before + 100.0)
+    press(visitor, "#value-front-suspension-stiffness", "ArrowLeft", "Home")
+    assert visitor.look("ridetune.clock.time") == time
+    # The 3D view hands the keys on.
+    visitor.element("#view iframe").click(position={"x": 200, "y": 200})
+    keyboard.press("Space")
+    visitor.until("ridetune.clock.playing")
+    visitor.settled()
+
+
+def test_every_control_is_reached_by_tab_and_has_a_name(visitor):
+    keyboard, seen = visitor.page.keyboard, []
+    visitor.element("body").press("Tab")
+    for _ in range(60):
+        seen.append(visitor.page.evaluate("document.activeElement.id"))
+        keyboard.press("Tab")
+    for control in ("ride", "compare", "identify", "help", f"slider-{STIFFNESS.replace('.', '-')}"):
+        assert control in seen
+    assert seen.index("ride") < seen.index("slider-front-suspension-stiffness")
+    nameless = visitor.page.evaluate(
+        """() => [...document.querySelectorAll("button, select, input, iframe")].filter((e) =>
+            !(e.labels?.length || e.getAttribute("aria-label") || e.title || e.textContent.trim()))
+            .map((e) => e.outerHTML)"""
+    )
+    assert nameless == []
+
+
+def test_tabs_and_help_work_by_keyboard(visitor):
+    press(visitor, "#tab-comfort", "ArrowRight")
+    assert visitor.element("#measurements").is_visible()
+    assert not visitor.element("#comfort").is_visible()
+    visitor.page.keyboard.press("ArrowRight")
+    assert visitor.element("#identification").is_visible()
+    press(visitor, "#help", "Enter")
+    assert visitor.element("#help-dialog").is_visible()
+    visitor.page.keyboard.press("Escape")
+    assert not visitor.element("#help-dialog").is_visible()
+
+
+def test_two_browsers_do_not_see_each_other(visit, service):
+    one, other = visit().open(service.address), visit().open(service.address)
+    press(one, "#slider-front-suspension-stiffness", "PageUp")
+    one.settled()
+    one.wait(lambda: not one.look("ridetune.unsaved()"), "the slider is saved")
+    assert one.look("ridetune.state('session')") != other.look("ridetune.state('session')")
+    other.page.reload()
+    other.wait_until_drawn()
+    assert other.value(STIFFNESS) == 22e3
+    other.expect("status of 404")
+    reply = other.page.goto(one.page.url)
+    assert reply.status == 404
+    assert other.element("a[href='/']").is_visible()
+
+
+def test_another_car_changes_sliders_and_scene(visitor):
+    visitor.click("#tab-car")
+    before = visitor.picture()
+    visitor.page.get_by_label("Reference cars").select_option("vw-vanagon")
+    visitor.until("ridetune.state('vehicle').name.includes('Vanagon')")
+    visitor.settled()
+    assert changed_pixels(visitor.picture(), before) > 5e-3
+    track = visitor.look("ridetune.state('vehicle').front.track")
+    assert position(visitor, "/car/wheel_fl")[1] == pytest.approx(track / 2, abs=0.02)
+
+
+def test_an_impossible_car_is_refused_in_words(visitor):
+    visitor.expect("status of 422")
+    visitor.click("#tab-car")
+    field = visitor.element("[title='chassis.mass'] input")
+    field.fill("-3")
+    field.press("Enter")
+    visitor.wait(lambda: visitor.element(".notice.error").is_visible(), "the refusal is shown")
+    assert "chassis.mass" in visitor.element(".notice.error").inner_text()
+    assert field.input_value() == "1048.5"
+
+
+def test_the_page_waits_while_the_service_compiles(visit, service):
+    visitor, asked = visit(), []
+    visitor.expect("status of 503")
+
+    def compiling(route):
+        asked.append(route)
+        if len(asked) < 3:
+            body = '{"state": "compiling", "message": "Compiling the simulation."}'
+            route.fulfill(status=503, content_type="application/json", body=body)
+        else:
+            route.continue_()
+
+    visitor.page.route("**/readyz", compiling)
+    visitor.page.goto(f"{service.address}?fixedDpr=0.4")
+    banner = visitor.element("#banner")
+    visitor.wait(banner.is_visible, "the page says that it compiles")
+    assert "Compiling" in banner.inner_text()
+    visitor.wait_until_drawn()
+    assert not banner.is_visible()
+
+
+def test_the_3d_view_comes_back_after_a_lost_connection(visitor):
+    seek(visitor, 8.0)
+    before = visitor.picture()
+    visitor.scene_frame().evaluate("() => window.bridge.retry()")
+    visitor.until("ridetune.scene.connections === 2 && ridetune.scene.built")
+    assert changed_pixels(visitor.picture(), before) < 1e-3
+
+
+def test_the_page_goes_on_when_the_service_has_been_away(visit, tmp_path):
+    service = Service(tmp_path / "data")
+    try:
+        visitor = visit().open(service.address)
+        visitor.expect(*AWAY)
+        service.stop(signal.SIGKILL)
+        press(visitor, "#slider-front-suspension-stiffness", "PageUp")
+        visitor.wait(visitor.element("#banner").is_visible, "the page says that it is alone")
+        service = Service(tmp_path / "data", service.port)
+        visitor.wait(lambda: not visitor.element("#banner").is_visible(), "the page goes on")
+        visitor.wait_until_drawn()
+        visitor.settled()
+        visitor.wait(lambda: not visitor.look("ridetune.unsaved()"), "the slider is saved")
+        visitor.page.reload()
+        visitor.wait_until_drawn()
+        assert visitor.value(STIFFNESS) == pytest.approx(23e3)
+    finally:
+        service.stop()
