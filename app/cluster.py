@@ -127,7 +127,7 @@ class Cluster:
         if self._client is None:
             try:
                 self._client = self._start()
-            except OSError as error:
+            except (OSError, RuntimeError) as error:
                 self._stop()
                 where = f"at {self._address}" if self._address else "on this machine"
                 log.error("cannot start or reach the job workers %s: %s", where, error)

@@ -7,7 +7,6 @@ ended is run again from its `spec`. Progress is in memory, and in the database o
 import asyncio
 import contextlib
 import logging
-import threading
 import time
 from collections.abc import AsyncIterator, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -56,7 +55,6 @@ class Jobs:
         self._cancelled: set[str] = set()
         self._followers: dict[str, set[asyncio.Event]] = {}
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._lock = threading.Lock()
         # One thread hands jobs over, in their order; it waits while the cluster starts.
         self._sender = ThreadPoolExecutor(1, "job-sender")
         self._canceller = ThreadPoolExecutor(1, "job-canceller")
@@ -165,12 +163,14 @@ class Jobs:
     def _send(self, job: Job) -> None:
         if not self._ready():
             return
-        with self._lock:
-            if job.id in self._cancelled:
-                return
         kind = self._kinds[job.kind]
         try:
-            self._cluster.submit(job.id, kind.task, kind.payload(job), self)
+            payload = kind.payload(job)
+            if job.id not in self._cancelled:
+                self._cluster.submit(job.id, kind.task, payload, self)
+            if job.id in self._cancelled:
+                # Perhaps only since: what was cancelled before it was there goes now.
+                self._cluster.cancel(job.id, GRACE)
         except RideError as error:
             self._fail(job.id, error.code, str(error))
         except Exception:
@@ -179,8 +179,7 @@ class Jobs:
 
     def _stop(self, job: Job) -> None:
         if job.state == "queued":
-            with self._lock:
-                self._cancelled.add(job.id)
+            self._cancelled.add(job.id)
             self._store.jobs.finish(job.id, "cancelled")
             self._wake(job.id)
         self._canceller.submit(self._cluster.cancel, job.id, GRACE)

@@ -20,10 +20,12 @@ class StandIn:
         self.tasks: dict[str, tuple] = {}
         self.cancelled: list[str] = []
         self.refusing = False
+        self.meanwhile: Callable[[str], object] = lambda name: None
 
     def submit(self, name, task, payload, listener):
         if self.refusing:
             raise Unavailable("The job workers cannot be reached.")
+        self.meanwhile(name)
         self.tasks[name] = (task, payload, listener)
 
     def cancel(self, name, grace):
@@ -190,6 +192,15 @@ def test_a_waiting_job_is_cancelled_at_once(owner, clusters):
     assert owner.post(f"/identifications/{job}/cancel").status_code == 202
     assert state(owner, job) == "cancelled"
     until(lambda: job in clusters[-1].cancelled)
+
+
+def test_a_job_cancelled_while_it_is_handed_over_does_not_run(owner, clusters):
+    """The cluster knows it only after it was told to cancel it; it is told again."""
+    clusters[-1].meanwhile = lambda name: owner.post(f"/identifications/{name}/cancel")
+    job = submit(owner)["id"]
+    until(lambda: state(owner, job) == "cancelled")
+    until(lambda: clusters[-1].cancelled.count(job) == 2)
+    assert clusters[-1].tasks == {}
 
 
 def test_a_running_job_is_asked_to_stop(owner, clusters):
