@@ -25,6 +25,9 @@ OPPOSITE = -0.5
 ALIKE = 5.0
 """Factor between measured and model amplitude up to which their signs are compared."""
 
+STANDING = {"chassis.z": 0.1, "chassis.pitch": 0.06, "chassis.roll": 0.06}
+"""Standard deviation (m, rad) beyond which a model has fallen over and is no witness."""
+
 POOR_FIT = 50.0
 """Fit percent below which a channel is reported, unless noise alone explains it."""
 
@@ -54,20 +57,20 @@ def correlation(measured: Array, model: Array) -> float:
     return float(one @ other) / size if size > 0.0 else 0.0
 
 
-def _amplitude_ratio(measured: Array, model: Array) -> float:
-    """Measured over model amplitude; 0 for a model that never moves."""
+def _amplitude_ratio(channel: str, measured: Array, model: Array) -> float:
+    """Measured over model amplitude; 0 for a model that never moves or has fallen over."""
     amplitude = float(np.std(model))
-    return float(np.std(measured)) / amplitude if amplitude > 0.0 else 0.0
+    return float(np.std(measured)) / amplitude if 0.0 < amplitude < STANDING[channel] else 0.0
 
 
 def wrong_sign(run: str, channel: str, measured: Array, start: Array, fitted: Array) -> str | None:
     """A channel that runs against the model, at the start values or after the fit.
 
-    A model that moves much more or less than the channel is no witness: it may have fallen over.
+    A model that moves much more or less than the channel is no witness.
     """
     for model, when in ((start, "at the start values"), (fitted, "after the fit")):
         opposed = correlation(measured, model)
-        if opposed < OPPOSITE and 1.0 / ALIKE < _amplitude_ratio(measured, model) < ALIKE:
+        if opposed < OPPOSITE and 1.0 / ALIKE < _amplitude_ratio(channel, measured, model) < ALIKE:
             return (
                 f"{channel} of run {run} runs against the model (correlation {opposed:.2f} {when});"
                 " its sign is probably wrong: multiply it by -1."
@@ -77,7 +80,7 @@ def wrong_sign(run: str, channel: str, measured: Array, start: Array, fitted: Ar
 
 def wrong_unit(run: str, channel: str, measured: Array, start: Array) -> str | None:
     """A channel whose amplitude is a unit's factor away from the model's at the start values."""
-    ratio = _amplitude_ratio(measured, start)
+    ratio = _amplitude_ratio(channel, measured, start)
     for expected, spread, numbers, header in UNIT_RATIOS[channel]:
         if expected / spread < ratio < expected * spread:
             return (

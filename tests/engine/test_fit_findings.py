@@ -40,6 +40,13 @@ def test_a_mistaken_unit_shows_in_the_amplitude(channel, factor, numbers, header
     assert f"in {numbers} under a header that says {header}" in finding
 
 
+def test_a_model_that_has_fallen_over_is_no_witness():
+    """A car on its nose by 0.3 rad looks like degrees taken for radians, the other way round."""
+    fallen = 0.3 * np.tanh(TIME - 8.0)
+    assert wrong_unit("lap", "chassis.pitch", BODY, fallen) is None
+    assert wrong_sign("lap", "chassis.pitch", -0.2 * fallen, fallen, fallen) is None
+
+
 @pytest.mark.parametrize("factor", [0.2, 1.0, 5.0])
 def test_a_wrong_guess_of_the_car_is_no_mistaken_unit(factor):
     assert wrong_unit("lap", "chassis.z", factor * BODY, BODY) is None
