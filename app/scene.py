@@ -9,6 +9,7 @@ names, and what a part's pose means, are therefore shared with static/poses.js:
     /car/pivot_fl ...        origin at the pivot
     /car/spring_fl ...       unit length along Z from the wheel centre to the mount, scaled
     /car/damper_fl, rod_fl   along Z, origins at the wheel centre and at the mount
+    /car/body/grip_front ... handles at the right-hand pivots, hidden until the page shows them
     /car/bar_front, bar_rear unit length along Y from the right arm to the left one, scaled
     /ghost/body, wheel_fl    outlines of the car it is compared with
     /road/surface, lines     the road, origin on the ground at X = 0; the page shapes it
@@ -61,6 +62,8 @@ def build(stage: Stage, vehicle: Vehicle) -> None:
     for axle in AXLES:
         _bar(stage.scene, vehicle, axle)
     _body(stage.scene, vehicle)
+    for axle in AXLES:
+        _grip(stage.scene, vehicle, axle)
     _road(stage.scene)
 
 
@@ -145,6 +148,21 @@ def _bar(scene: SceneApi, vehicle: Vehicle, axle: AxleName) -> None:
     left, right = (_bar_end(vehicle, corner) for corner in CORNERS if axle_of(corner) == axle)
     scale = (1, float(np.linalg.norm(left - right)), 1)
     _part(scene, f"/car/bar_{axle}", BAR_MESH, BAR, right, scale=scale)
+
+
+def _grip(scene: SceneApi, vehicle: Vehicle, axle: AxleName) -> None:
+    corner: Corner = "fr" if axle == "front" else "rr"
+    inboard = np.array([0, side_of(corner) * INBOARD, vehicle.chassis.cg_height])
+    scene.add_transform_controls(
+        f"/car/body/grip_{axle}",
+        scale=0.42,
+        line_width=3.0,
+        active_axes=(True, False, True),
+        disable_rotations=True,
+        depth_test=False,
+        position=pivot(vehicle, corner) - inboard,
+        visible=False,
+    )
 
 
 def _bar_end(vehicle: Vehicle, corner: Corner) -> np.ndarray:

@@ -2,7 +2,8 @@
 //
 // window.bridge.inject(messages) hands messages to viser as if its server had sent them.
 // The page hears `viewer` events on its own window: {state: "connected" | "closed"} and
-// {state: "scene", names} when the server has (re)built nodes, after which poses must be sent again.
+// {state: "scene", names} when the server has (re)built nodes, after which poses must be sent again,
+// and {state: "grip", phase, name, position} while a handle is dragged.
 // Rests on private ways of viser 1.1.1: its worker's messages. tests/browser holds it to them.
 (() => {
   const NativeWorker = window.Worker;
@@ -41,6 +42,9 @@
           if (!event.injected) setTimeout(listen, 0, event);
         });
       }
+      const said = message?.type === "send" ? message.message : null;
+      const grip = /^TransformControls(DragStart|Update|DragEnd)Message$/.exec(said?.type);
+      if (grip) tell({ state: "grip", phase: grip[1], name: said.name, position: said.position });
       return super.postMessage(message, transfer);
     }
   };

@@ -2,7 +2,7 @@
 
 import * as api from "./api.js";
 import { valueAt, valuesOf, withValues } from "./controls.js";
-import { $, h } from "./dom.js";
+import { $, fileName, h, saveFile } from "./dom.js";
 import { notice, refused } from "./notices.js";
 import { get, on, set } from "./store.js";
 import * as units from "./units.js";
@@ -109,11 +109,5 @@ async function load(file) {
 
 function download() {
   const vehicle = withValues(get("vehicle"), get("values"));
-  const link = h("a", {
-    href: URL.createObjectURL(new Blob([JSON.stringify(vehicle, null, 1)],
-      { type: "application/json" })),
-    download: `${vehicle.name.replace(/\W+/g, "-").toLowerCase() || "vehicle"}.json`,
-  });
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  saveFile(vehicle, `${fileName(vehicle.name)}.json`);
 }

@@ -26,6 +26,8 @@ const FREQUENCIES = [0.2, 30];
 const BOTTOM_AXIS = 38;
 const BARE_AXIS = 10;
 const CLICK_PIXELS = 4;
+/** Half the least height of a chart in display units: rounding errors are no motion. */
+const LEAST_ROOM = 5e-3;
 
 let group = "body";
 let charts = [];
@@ -155,7 +157,7 @@ function options(name, spectrum, labelled) {
 /** A little air above and below; a flat line lies in the middle. */
 function room(_, low, high) {
   if (low === null || high === null) return [-1, 1];
-  const air = Math.max((high - low) * 0.08, Math.abs(high) * 1e-3, 1e-6);
+  const air = Math.max((high - low) * 0.08, LEAST_ROOM);
   return [low - air, high + air];
 }
 
@@ -169,9 +171,7 @@ function fill() {
     const data = runs.map((run) => run?.values[channel] ?? null);
     const empty = box.querySelector(".chart-empty");
     empty.hidden = !base || data.some(Boolean);
-    empty.textContent = base?.head.mode === "rims" && channel.startsWith("tyre.")
-      ? "Not in this ride: with measured rims the tyres play no part. Choose a manoeuvre."
-      : "Not in this ride.";
+    empty.textContent = "Not in this ride.";
     if (spectrum) {
       fillSpectrum(entry, runs, channel);
       continue;
@@ -279,7 +279,7 @@ function readings() {
   for (const { plot, values, spectrum } of charts) {
     if (spectrum || !plot.data[0].length) continue;
     const { min, max } = plot.scales.y;
-    const decimals = Math.min(Math.max(2 - Math.floor(Math.log10(max - min || 1)), 0), 6);
+    const decimals = Math.min(Math.max(3 - Math.floor(Math.log10(max - min || 1)), 0), 6);
     const [i, w] = locate(plot.data[0], t);
     values.forEach((element, k) => {
       const value = plot.data[k + 1]?.[w > 0.5 ? i + 1 : i];

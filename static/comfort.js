@@ -1,12 +1,29 @@
 // Comfort and road holding in numbers: now against the car it is compared with.
 
-import { $, h } from "./dom.js";
-import { get, on } from "./store.js";
+import * as api from "./api.js";
+import { $, fileName, h, saveFile } from "./dom.js";
+import { refused } from "./notices.js";
+import { ofRide } from "./simulation.js";
+import { get, on, set } from "./store.js";
 import * as units from "./units.js";
 
 const SAME = 0.001;
 
+let table = null;
+let lift = null;
+
 export function build() {
+  lift = h("label", {
+    className: "inline", title: "Off, as in the paper: a tyre may pull on the road",
+  }, h("input", {
+    type: "checkbox", id: "lift-off",
+    on: { change: (event) => set({ liftOff: event.target.checked }) },
+  }), "Wheels may lift off");
+  table = h("div");
+  $("#comfort").append(table, h("div", { className: "row-tools after-table" }, lift,
+    h("button", { type: "button", id: "save-run",
+      title: "Every channel of the simulated ride as a measurement file", on: { click: save } },
+      "Save run as CSV")));
   on("now reference measured compare", show);
   show();
 }
@@ -14,21 +31,34 @@ export function build() {
 function show() {
   const now = get("now")?.head;
   const other = get("reference")?.head;
-  const panel = $("#comfort");
+  lift.hidden = now?.mode === "rims";
   if (!now) {
-    panel.replaceChildren(h("p", { className: "empty" },
+    table.replaceChildren(h("p", { className: "empty" },
       get("trouble") ?? "The numbers come with the first simulation."));
     return;
   }
   const name = get("compare") === "7dof" ? "7-DOF model" : "Baseline";
   const rows = now.metrics.map((metric) => row(metric, find(other, metric.name)));
-  const table = h("table", { className: "metrics" },
+  const figures = h("table", { className: "metrics" },
     h("thead", {}, h("tr", {},
       h("th", { scope: "col" }, "Metric of the ride"), h("th", { scope: "col" }, name),
       h("th", { scope: "col" }, "Now"), h("th", { scope: "col" }, "Unit"),
       h("th", { scope: "col" }, "Change"))),
     h("tbody", {}, rows));
-  panel.replaceChildren(...[fits(now, other, name), table, warnings(now)].filter(Boolean));
+  table.replaceChildren(...[fits(now, other, name), warnings(now), figures].filter(Boolean));
+}
+
+async function save() {
+  const ride = get("ride");
+  const name = ride.key ? `manoeuvre-${ride.key}`
+    : get("measurements").find(({ id }) => id === ride.id).name;
+  try {
+    const file = await api.simulateFile(ofRide({ vehicle: get("vehicle"), values: get("values") }));
+    saveFile(file, `${fileName(name)}-simulated.csv`);
+  } catch (error) {
+    if (error.lost) set({ online: false });
+    refused(error, "Saving the run");
+  }
 }
 
 const find = (head, name) => head?.metrics.find((metric) => metric.name === name);

@@ -21,6 +21,19 @@ export function h(tag, props = {}, ...children) {
 
 export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
+/** Hand a file to the visitor: a blob, or data to be written as JSON. */
+export function saveFile(content, name) {
+  const blob = content instanceof Blob ? content
+    : new Blob([`${JSON.stringify(content, null, 1)}\n`], { type: "application/json" });
+  const link = h("a", { href: URL.createObjectURL(blob), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+/** Words as the stem of a file's name. */
+export const fileName = (text) =>
+  text.replace(/\.\w+$/, "").replace(/\W+/g, "-").toLowerCase().slice(0, 60) || "ridetune";
+
 /** A file name that may break after its underscores. */
 export const breakable = (name) => name.split(/(?<=[_-])/).flatMap((part) => [part, h("wbr")]);
 

@@ -4,7 +4,7 @@ import * as api from "./api.js";
 import { DETERMINED, isBounded } from "./controls.js";
 import { percent, short } from "./comfort.js";
 import { costChart } from "./cost.js";
-import { $, breakable, h, symbol } from "./dom.js";
+import { $, breakable, fileName, h, saveFile, symbol } from "./dom.js";
 import { notice, refused } from "./notices.js";
 import { get, on, set } from "./store.js";
 import * as units from "./units.js";
@@ -288,6 +288,9 @@ function fit() {
       h("button", { type: "button", id: "apply", className: "primary wide",
         on: { click: () => hooks.apply(result) } }, "Apply to sliders"),
       scores(result),
+      h("button", { type: "button", className: "wide", title: "fit.json, also for the command line",
+        on: { click: () => saveFile(result, `${fileName(job.runs[0].name)}-fit.json`) } },
+        "Save fit"),
       h("h3", {}, "Cost"), cost.element, h("p", { className: "hint", id: "cost-now" })));
 }
 

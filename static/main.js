@@ -32,7 +32,7 @@ let saving = false;
 
 async function start() {
   api.useSession(sid);
-  set({ session: sid, online: true, ready: false, compare: "baseline", road: null, fit: null,
+  set({ session: sid, online: true, ready: false, compare: "baseline", road: null, liftOff: false, fit: null,
     now: null, reference: null, measured: null, traction: "exact" });
   const [session, parameters, channels, vehicles, manoeuvres, roads] = await Promise.all([
     api.session(), api.parameters(), api.channels(), api.vehicles(), api.manoeuvres(), api.roads(),
@@ -79,6 +79,7 @@ function follow() {
     want("now", ...(get("compare") === "7dof" ? ["reference"] : []));
   });
   on("baseline compare", () => want("reference"));
+  on("liftOff", () => want("now", "reference"));
   on("vehicle", () => want("now", "scene", "reference"));
   on("ride road", () => {
     set({ now: null, reference: null, measured: null });

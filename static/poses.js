@@ -10,7 +10,7 @@ export const CORNERS = ["fl", "fr", "rl", "rr"];
 /** Channels that a pose is made of. */
 export const POSE_CHANNELS = [
   "chassis.x", "chassis.z", "chassis.pitch", "chassis.roll",
-  ...CORNERS.flatMap((c) => [`arm.${c}.angle`, `wheel.${c}.z`, `road.${c}.z`]),
+  ...CORNERS.flatMap((c) => [`arm.${c}.angle`, `wheel.${c}.z`, `road.${c}.z`, `post.${c}.z`]),
 ];
 
 /** Index and weight of an instant between samples: value = (1 - w) v[i] + w v[i + 1]. */
@@ -104,6 +104,9 @@ export function carMessages(vehicle, run, t, magnification) {
       update(`/car/spring_${name}`, { scale: [1, 1, distance(inner, mount)] }),
       update(`/car/arm_${name}`, { scale: [length, 1, 1] }),
     );
+    if (side < 0) {
+      messages.push(position(`/car/body/grip_${name === "fr" ? "front" : "rear"}`, inboard(pivot)));
+    }
     onBar[name] = inner.map((value, k) => value + BAR_SHARE * (hinge[k] - value));
   }
   for (const [axle, right, left] of [["front", onBar.fr, onBar.fl], ["rear", onBar.rr, onBar.rl]]) {
@@ -111,11 +114,28 @@ export function carMessages(vehicle, run, t, magnification) {
     messages.push(...pose(`/car/bar_${axle}`, right, across),
       update(`/car/bar_${axle}`, { scale: [1, length, 1] }));
   }
-  messages.push(
-    position("/road/surface", [-travelled, 0, 0]),
-    position("/road/lines", [-travelled, 0, 0.004]),
-  );
+  const [height, tilt] = ground(vehicle, run, where, magnification);
+  messages.push(...pose("/road/surface", [-travelled, 0, height], tilt),
+    ...pose("/road/lines", [-travelled, 0, height + 0.004], tilt));
   return messages;
+}
+
+/** On a rig the ground is the plane that the posts' heights make: height and turn. */
+function ground(vehicle, run, where, magnification) {
+  const [fl, fr, rl, rr] = CORNERS.map((c) => magnification * or0(valueAt(run, `post.${c}.z`, where)));
+  const { front, rear } = vehicle;
+  const front_z = (fl + fr) / 2;
+  const rear_z = (rl + rr) / 2;
+  const slope = (front_z - rear_z) / (front.cg_distance + rear.cg_distance);
+  const bank = (fl - fr + rl - rr) / (front.track + rear.track);
+  return [rear_z + slope * rear.cg_distance,
+    product(aboutY(-Math.atan(slope)), [Math.cos(bank / 2), Math.sin(bank / 2), 0, 0])];
+}
+
+/** Pivot distance and angle (SI) of an axle from where its grip is, in B. */
+export function pivotAt(vehicle, axle, [x, , z]) {
+  const distance = axle === "front" ? vehicle.front.cg_distance - x : x + vehicle.rear.cg_distance;
+  return { distance, angle: Math.atan((z + vehicle.chassis.cg_height) / distance) };
 }
 
 /** viser messages for the outline of another run of the same instant. */

@@ -1,9 +1,9 @@
 // The 3D view: viser in a frame of our own origin, posed through its bridge (bridge.js).
 
 import { $, h } from "./dom.js";
-import { carMessages, ghostMessages, update, visibility } from "./poses.js";
+import { carMessages, ghostMessages, pivotAt, update, visibility } from "./poses.js";
 import { surface } from "./road.js";
-import { get, on } from "./store.js";
+import { get, on, set } from "./store.js";
 import { clock, onTime } from "./timeline.js";
 
 const CAMERAS = {
@@ -20,6 +20,9 @@ let frame = null;
 let parts = new Set();
 let shownRoad = null;
 let shownGhost = null;
+let shownGrips = null;
+/** The grip that is being dragged stays where the hand is. */
+let held = null;
 let waiting = 0;
 const scales = new Map();
 /** What the browser tests look at. */
@@ -33,12 +36,17 @@ export function build(sid, { askForCar }) {
     return;
   }
   window.addEventListener("viewer", ({ detail }) => {
+    if (detail.state === "grip") {
+      gripped(detail);
+      return;
+    }
     clearTimeout(waiting);
     if (detail.state === "scene") {
       parts = new Set(detail.names);
       seen.built = parts.has("/car/body");
       shownRoad = null;
       shownGhost = null;
+      shownGrips = null;
       scales.clear();
       if (seen.built) {
         note("");
@@ -64,6 +72,11 @@ export function build(sid, { askForCar }) {
     button.addEventListener("click", () => look(button.dataset.camera));
   }
   $("#ghost").addEventListener("change", refresh);
+  const grips = $("#grips");
+  grips.addEventListener("click", () => {
+    grips.setAttribute("aria-pressed", grips.getAttribute("aria-pressed") !== "true");
+    place();
+  });
   onTime(place);
   on("now reference measured ride compare", refresh);
   on("online", (state) => {
@@ -108,6 +121,23 @@ function ghostRun() {
   return ["measured", measured];
 }
 
+/** A dragged pivot moves its two sliders, within their ranges. */
+function gripped({ phase, name, position }) {
+  held = phase === "DragEnd" ? null : name;
+  if (phase !== "Update") {
+    place();
+    return;
+  }
+  const axle = name.endsWith("front") ? "front" : "rear";
+  const changes = Object.entries(pivotAt(get("vehicle"), axle, position)).map(([key, value]) => {
+    const path = `${axle}.pivot.${key}`;
+    const row = get("parameters").find((parameter) => parameter.name === path);
+    const rounded = Math.round(value / row.step) * row.step;
+    return [path, Math.min(Math.max(rounded, row.slider_lower), row.slider_upper)];
+  });
+  set({ values: { ...get("values"), ...Object.fromEntries(changes) } });
+}
+
 /** Everything anew: after another run, another ride or rebuilt nodes. */
 function refresh() {
   if (!seen.built) return;
@@ -130,13 +160,20 @@ function place() {
       if (ghost) messages.push(update(name, { colors: new Uint8Array(GHOSTS[kind]) }));
     }
   }
+  const grips = $("#grips").getAttribute("aria-pressed") === "true";
+  if (grips !== shownGrips) {
+    shownGrips = grips;
+    for (const name of parts) {
+      if (name.includes("/grip_")) messages.push(visibility(name, grips));
+    }
+  }
   if (ghost) messages.push(...ghostMessages(vehicle, ghost, clock.time, clock.magnification));
   if (shownRoad && shownRoad.magnification !== clock.magnification) {
     shownRoad.magnification = clock.magnification;
     const scale = [1, 1, clock.magnification];
     messages.push(update("/road/surface", { scale }), update("/road/lines", { scale }));
   }
-  inject(messages);
+  inject(messages.filter(({ name }) => name !== held));
 }
 
 /** The road is shaped once a ride: the sliders move the car, not the ground. */

@@ -26,15 +26,23 @@ export function want(...names) {
   if (!running) loop();
 }
 
-/** The body of a simulation of the chosen ride. */
-export function request(extra) {
+/** A car on the chosen ride, as much of it as the page shows. */
+function request(car) {
+  return {
+    ...ofRide(car), max_samples: MOST_SAMPLES, decimate: "stride", seq: ++sequence,
+    channels: [...new Set([...POSE_CHANNELS, ...visibleChannels()])],
+  };
+}
+
+/** A car on the chosen ride, every channel and sample of it. */
+export function ofRide(car) {
   const ride = get("ride");
-  const body = { max_samples: MOST_SAMPLES, decimate: "stride", seq: ++sequence, ...extra };
-  body.channels = [...new Set([...POSE_CHANNELS, ...visibleChannels()])];
+  const body = { ...car };
   if (ride.kind === "measurement") {
     body.rims = { measurement: ride.id, traction: get("traction") };
   } else {
     body.manoeuvre = ride.key;
+    body.lift_off = get("liftOff");
     if (get("road")) body.road = get("road");
   }
   return body;

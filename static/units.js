@@ -34,7 +34,7 @@ export const parameter = (name) => parameters.get(name);
 /** A number for reading: `digits` significant, no exponent for sizes a person meets. */
 export function number(value, digits = 4) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
-  if (value === 0) return "0";
+  if (Math.abs(value) < 1e-9) return "0";
   const size = Math.floor(Math.log10(Math.abs(value)));
   if (size >= 7 || size < -5) return minus(value.toExponential(digits - 1));
   return minus(value.toFixed(Math.min(Math.max(digits - 1 - size, 0), 6)));

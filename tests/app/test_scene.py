@@ -81,9 +81,17 @@ def test_stabilizer_bars_join_the_two_arms(nodes, axle):
     assert left[1] > 0
 
 
-def test_ghosts_are_hidden_until_the_page_shows_them(nodes):
+def test_ghosts_and_grips_are_hidden_until_the_page_shows_them(nodes):
     hidden = {name for name, (_, _, options) in nodes.items() if options.get("visible") is False}
-    assert hidden == {name for name in nodes if name.startswith("/ghost/")}
+    assert hidden == {name for name in nodes if name.startswith(("/ghost/", "/car/body/grip_"))}
+
+
+@pytest.mark.parametrize(("axle", "corner"), [("front", "fr"), ("rear", "rr")])
+def test_grips_sit_at_the_pivots(nodes, vehicle, axle, corner):
+    """The grip is a child of the body, whose origin is the CG."""
+    _, _, options = nodes[f"/car/body/grip_{axle}"]
+    hinge, _ = ends(nodes, f"/car/arm_{corner}", (1, 0, 0))
+    assert_allclose(options["position"] + np.array([0, 0, vehicle.chassis.cg_height]), hinge)
 
 
 @pytest.mark.parametrize(

@@ -63,6 +63,31 @@ def test_the_pivot_moves_in_3d(visitor):
     assert changed_pixels(visitor.picture(), before) > 5e-4
 
 
+def test_a_pivot_is_dragged_in_3d(visitor):
+    """The handle's green square moves the pivot along the car and up."""
+    visitor.click("[data-camera=side]")
+    plain = visitor.picture().astype(int)
+    visitor.click("#grips")
+    picture = visitor.picture().astype(int)
+    green = (picture[..., 1] > picture[..., 0] + 40) & (picture[..., 1] > picture[..., 2] + 20)
+    rows, columns = np.nonzero(green & (np.abs(picture - plain).max(axis=2) > 60))
+    assert rows.size > 10
+    first = columns < columns.min() + 12
+    box, mouse = visitor.element("#view iframe").bounding_box(), visitor.page.mouse
+    x, y = box["x"] + columns[first].mean(), box["y"] + rows[first].mean()
+    before = [visitor.value(f"front.pivot.{what}") for what in ("distance", "angle")]
+    mouse.move(x, y)
+    visitor.page.wait_for_timeout(200)
+    mouse.down()
+    for step in range(6):
+        mouse.move(x - 6 * step, y - 3 * step)
+        visitor.page.wait_for_timeout(60)
+    mouse.up()
+    visitor.until(f"ridetune.state('values')['front.pivot.distance'] > {before[0]} + 0.05")
+    assert visitor.value("front.pivot.angle") > before[1]
+    visitor.settled()
+
+
 def test_playing_moves_the_picture_and_pausing_holds_it(visitor):
     visitor.page.select_option("#ride", "manoeuvre 2")
     visitor.until("ridetune.state('now') && ridetune.state('now').head.mode === 'road'")
@@ -110,6 +135,26 @@ def test_a_manoeuvre_on_another_road_has_tyre_loads_and_numbers(visitor):
     smooth = visitor.line("tyre.fl.load")
     assert smooth.std() < 0.5 * rough.std()
     assert "Baseline" in visitor.element(".metrics").inner_text()
+
+
+def test_the_simulated_ride_is_saved_as_a_measurement_file(visitor):
+    with visitor.page.expect_download() as saved:
+        visitor.click("#save-run")
+    lines = saved.value.path().read_text().splitlines()
+    assert lines[0].startswith("time [s],chassis.z [m]")
+    assert len(lines) == 1 + 4001
+
+
+def test_a_tyre_that_pulls_is_told_and_may_lift_off(visitor):
+    visitor.page.select_option("#ride", "manoeuvre constant-speed-c")
+    visitor.page.select_option("#road", label="ISO 8608 class F")
+    visitor.settled()
+    assert "A tyre pulls on the road" in visitor.element("#comfort").inner_text()
+    visitor.click("#lift-off")
+    visitor.settled()
+    visitor.click("#charts-tyre")
+    visitor.settled()
+    assert visitor.line("tyre.fl.load").min() == 0.0
 
 
 def test_the_seven_dof_model_shows_what_the_arms_add(visitor):
