@@ -2,7 +2,7 @@
 
 import { $, debounced, h, tabs } from "./dom.js";
 import { CORNERS, locate } from "./poses.js";
-import { AXIS, decades, powerOfTen } from "./plots.js";
+import { AXIS, decadeLabels, decades } from "./plots.js";
 import { density } from "./spectrum.js";
 import { get, on } from "./store.js";
 import { clock, onTime, seek } from "./timeline.js";
@@ -143,7 +143,7 @@ function options(name, spectrum, labelled) {
     config.axes[0].values = (_, splits) => splits;
     config.axes.forEach((axis) => { axis.filter = (_, splits) => splits; });
     config.axes[1].splits = (_, _axis, low, high) => decades(low, high);
-    config.axes[1].values = (_, splits) => splits.map(powerOfTen);
+    config.axes[1].values = decadeLabels;
     config.cursor.drag = { x: false, y: false };
     config.cursor.show = false;
     config.hooks = {};
@@ -279,7 +279,7 @@ function readings() {
   for (const { plot, values, spectrum } of charts) {
     if (spectrum || !plot.data[0].length) continue;
     const { min, max } = plot.scales.y;
-    const decimals = Math.min(Math.max(3 - Math.floor(Math.log10(max - min || 1)), 0), 6);
+    const decimals = Math.min(Math.max(Math.round(2.6 - Math.log10(max - min || 1)), 0), 6);
     const [i, w] = locate(plot.data[0], t);
     values.forEach((element, k) => {
       const value = plot.data[k + 1]?.[w > 0.5 ? i + 1 : i];

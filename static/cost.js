@@ -1,7 +1,7 @@
 // The cost over the steps of a fit, on a logarithmic scale.
 
 import { h } from "./dom.js";
-import { AXIS, decades, fitWidth, powerOfTen } from "./plots.js";
+import { AXIS, decadeLabels, decades, fitWidth } from "./plots.js";
 
 /** {element, show(history)}. */
 export function costChart(height) {
@@ -23,7 +23,7 @@ export function costChart(height) {
         { ...AXIS, size: 22, gap: 2, incrs: [1, 2, 5, 10, 20, 50, 100, 200, 500] },
         { ...AXIS, size: 40, gap: 2, filter: (_, splits) => splits,
           splits: (_, _axis, low, high) => decades(low, high),
-          values: (_, splits) => splits.map(powerOfTen) },
+          values: decadeLabels },
       ],
       series: [{}, { stroke: "#e69f00", width: 1.5, points: { show: true, size: 4 } }],
     }, data, element);

@@ -135,7 +135,7 @@ async function detail(row) {
       h("strong", { className: "name" }, breakable(row.name)),
       row.usable_for_identification
         ? h("button", { type: "button", on: { click: () => choose(`measurement ${row.id}`) } },
-            "Drive it")
+            "Use as ride")
         : null,
       h("a", { className: "button", href: api.originalUrl(row.id), download: row.name }, "Download"),
       h("button", { type: "button", className: "danger", on: { click: (event) => remove(row, event) } },

@@ -25,8 +25,11 @@ export function decades(low, high) {
   return Array.from({ length: last - first + 1 }, (_, i) => 10 ** (first + i));
 }
 
+/** Labels of decades; the lowest would run into the other axis. */
+export const decadeLabels = (_, splits) => splits.map((v, i) => (i ? powerOfTen(v) : ""));
+
 /** 0.01 to 1000 as they are, other powers of ten with their exponent. */
-export function powerOfTen(value) {
+function powerOfTen(value) {
   const power = Math.round(Math.log10(value));
   if (power >= -2 && power <= 3) return String(Number((10 ** power).toPrecision(1)));
   const raised = String(power).replace(/./g, (c) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)]);

@@ -56,19 +56,19 @@ const minus = (text) => text.replace("-", "−");
 /** Units of a vehicle's known data by the last word of their path. */
 const KNOWN = {
   mass: ["kg", "mass"],
-  xx: ["kg m²", "roll inertia xx"],
-  yy: ["kg m²", "pitch inertia yy"],
-  zz: ["kg m²", "yaw inertia zz"],
-  xz: ["kg m²", "product of inertia xz"],
-  cg_height: ["m", "height of the CG at rest"],
-  cg_distance: ["m", "axle to CG, along the car"],
+  xx: ["kg m²", "inertia xx, roll"],
+  yy: ["kg m²", "inertia yy, pitch"],
+  zz: ["kg m²", "inertia zz, yaw"],
+  xz: ["kg m²", "product xz"],
+  cg_height: ["m", "CG height"],
+  cg_distance: ["m", "axle to CG"],
   track: ["m", "track"],
-  radius: ["m", "loaded radius"],
-  mount_height: ["m", "mount above wheel centre"],
+  radius: ["m", "radius, loaded"],
+  mount_height: ["m", "mount height"],
   rolling_resistance: ["", "rolling resistance"],
   front_share: ["", "front share of braking"],
-  stiffness: ["N/m", "vertical stiffness"],
-  damping: ["N s/m", "vertical damping"],
+  stiffness: ["N/m", "stiffness"],
+  damping: ["N s/m", "damping"],
 };
 
 /** {unit, label} of a number of the vehicle's JSON that is no slider. */
