@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from .errors import SimulationDiverged, SimulationError
 from .frames import COORDINATES
-from .kernels.integrate import integrate_free, integrate_rims
+from .kernels.integrate import BODY_ROWS, integrate_free, integrate_rims
 from .kernels.lanes import BATCH, ONE_CAR
 from .kernels.observe import OUTPUTS, CarOutput, CornerOutput, observe_free, observe_rims
+from .kernels.records import Corner
 from .rims import RimsInputs
 from .road import Road
 from .stepping import FreeInputs
@@ -26,10 +27,15 @@ _AT_REST = 1e-9
 
 FIRST_CORNER = len(CarOutput._fields)
 CORNER_SIZE = len(CornerOutput._fields)
-_ARM_ACCELERATIONS = [
-    FIRST_CORNER + corner * CORNER_SIZE + CornerOutput._fields.index("acceleration")
-    for corner in range(4)
-]
+
+
+def _columns(field: str) -> list[int]:
+    """Where one field of the four corners stands in the outputs."""
+    first = FIRST_CORNER + CornerOutput._fields.index(field)
+    return [first + corner * CORNER_SIZE for corner in range(4)]
+
+
+_ARM_ACCELERATIONS, _REACHES = _columns("acceleration"), _columns("reach")
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,11 +110,18 @@ def rims_states(cars: Array, inputs: RimsInputs, exact: bool) -> States:
 def check_sound(states: States, car: int, time: Array, reach: Array | None = None) -> None:
     """Raise SimulationDiverged where a car has failed, naming time and coordinate.
 
+    SimulationError where it failed before the first step, for want of a static equilibrium.
+
     reach (4,) : of the rims mode, at the failure
     """
     sample = int(states.failed[car])
     if sample < 0:
         return
+    if sample == 0:
+        raise SimulationError(
+            "No static equilibrium at the start: the first heights of road, posts or wheels are"
+            " out of the suspension's reach; check their unit and that they count from rest."
+        )
     if reach is not None and reach.min() < 0.0:
         arm = COORDINATES[4 + int(np.argmin(reach))]
         raise SimulationDiverged(
@@ -184,7 +197,7 @@ def _free_rest(car: Array, inputs: FreeInputs) -> Array:
         return np.concatenate([out[:, 1:4], out[:, _ARM_ACCELERATIONS]], axis=1)
 
     state = np.zeros(16)
-    state[1:8] = _rest(accelerations, 7)
+    state[1:8] = _rest(accelerations, np.zeros(7))
     return state
 
 
@@ -196,19 +209,32 @@ def _rims_rest(car: Array, first: Array) -> Array:
     def accelerations(q: Array) -> Array:
         states = np.zeros((len(q), 16))
         states[:, 1:4] = q
-        return rims_outputs(car, states, np.tile(acting, (len(q), 1)), True)[:, 1:4]
+        out = rims_outputs(car, states, np.tile(acting, (len(q), 1)), True)
+        reached = np.all(out[:, _REACHES] >= 0.0, axis=1)
+        return np.where(reached[:, np.newaxis], out[:, 1:4], np.nan)
 
     state = np.zeros(16)
-    state[1:4] = _rest(accelerations, 3)
+    state[1:4] = _rest(accelerations, _plane(car, acting[:4]))
     return state
 
 
-def _rest(accelerations: Callable[[Array], Array], size: int) -> Array:
-    """Coordinates without acceleration, by Newton's method from the design position.
+def _plane(car: Array, heights: Array) -> Array:
+    """z, pitch and roll of a rigid car whose wheel centres come nearest to four heights."""
+    corners = car[BODY_ROWS:].reshape(4, -1)
+    of = Corner._fields.index
+    x = corners[:, of("pivot_x")] + corners[:, of("arm_x")]
+    y = corners[:, of("pivot_y")]
+    plane = np.column_stack([np.ones(4), -x, y])
+    return np.asarray(np.linalg.lstsq(plane, heights, rcond=None)[0], dtype=np.float64)
+
+
+def _rest(accelerations: Callable[[Array], Array], guess: Array) -> Array:
+    """Coordinates without acceleration, by Newton's method from a guess (size,).
 
     accelerations : coordinates (n, size) -> accelerations (n, size)
+    Not a number where there are none; the car has then failed before its first step.
     """
-    q = np.zeros(size)
+    q, size = guess, guess.size
     for _ in range(_NEWTON_STEPS):
         trials = np.vstack([q, q + _DIFFERENCE * np.eye(size), q - _DIFFERENCE * np.eye(size)])
         values = accelerations(trials)
@@ -218,7 +244,4 @@ def _rest(accelerations: Callable[[Array], Array], size: int) -> Array:
         if not np.all(np.isfinite(jacobian)):
             break
         q = q - np.linalg.lstsq(jacobian, values[0], rcond=None)[0]
-    raise SimulationError(
-        "No static equilibrium at the start: the first heights of road, posts or wheels are out of"
-        " the suspension's reach; check their unit and that they are measured from rest."
-    )
+    return np.full(size, np.nan)

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import Cancelled, SimulationError
+from .errors import Cancelled
 from .filters import smoothed
 from .problem import Problem
 from .rims import OUTPUT_CHANNELS, RimsInputs
@@ -174,7 +174,7 @@ class Residuals:
         try:
             parts = [
                 [
-                    pool.submit(self._simulated, some, seen.inputs)
+                    pool.submit(self._simulate, some, seen.inputs, self.problem.traction)
                     for some in _parts(vehicles, len(seen.inputs.node_time))
                 ]
                 for seen in self.problem.observations
@@ -187,15 +187,6 @@ class Residuals:
             return [np.concatenate([future.result() for future in run]) for run in parts]
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
-
-    def _simulated(self, vehicles: list[Vehicle], inputs: RimsInputs) -> Array:
-        """(cars, samples, 3); a car without static equilibrium at the start fails by itself."""
-        try:
-            return self._simulate(vehicles, inputs, self.problem.traction)
-        except SimulationError:
-            if len(vehicles) == 1:
-                return np.full((1, len(inputs.time), len(OUTPUT_CHANNELS)), np.nan)
-            return np.concatenate([self._simulated([one], inputs) for one in vehicles])
 
     def _filtered(self, time: Array, histories: Array) -> Array:
         """Histories (cars, samples, 3) through the output filter; a failed car stays as it is."""

@@ -166,6 +166,28 @@ def test_rims_out_of_reach_are_named(car, driven):
         simulate_rims(car, Run("wrong unit", driven.time, wheels))
 
 
+def test_a_car_without_equilibrium_fails_alone_in_its_batch(car, driven):
+    """Oracle: arms of 0.1 m cannot follow wheels that start half a metre apart; arms of 1 m can."""
+    raised = {**driven.channels, "wheel.fl.z": driven["wheel.fl.z"] + 0.5}
+    run = Run("raised", driven.time, raised)
+    short = car.with_values({"front.pivot.distance": 0.1})
+    inputs = prepare(run, car)
+    batch = rims_batch([short, car], inputs, "exact")
+    assert np.all(np.isnan(batch[0]))
+    assert_allclose(batch[1], rims_batch([car], inputs, "exact")[0], rtol=0, atol=1e-11)
+    with pytest.raises(SimulationError, match="No static equilibrium"):
+        simulate_rims(short, run)
+
+
+def test_a_lifted_car_starts_at_rest_on_its_lifted_wheels(car, driven):
+    """Oracle: rigid translation, beyond the reach of arms whose chassis stays down."""
+    time = np.linspace(0.0, 1.0, 201)
+    channels = {f"wheel.{corner}.z": np.full(time.size, 3.0) for corner in CORNERS}
+    run = simulate_rims(car, Run("lifted", time, channels | {"chassis.a_x": 0.0 * time})).run
+    assert_allclose(run["chassis.z"], 3.0, rtol=0, atol=1e-9)
+    assert_allclose(run["arm.fl.angle"], 0.0, rtol=0, atol=1e-9)
+
+
 def test_modes_refuse_each_others_manoeuvres(car):
     manoeuvres = reference_manoeuvres()
     with pytest.raises(SimulationError, match="posts mode"):
