@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from .errors import SimulationDiverged, SimulationError
 from .frames import COORDINATES
-from .kernels.integrate import BODY_ROWS, integrate_free, integrate_rims
+from .kernels.buffer import BODY_ROWS
+from .kernels.integrate import integrate_free, integrate_rims
 from .kernels.lanes import BATCH, ONE_CAR
 from .kernels.observe import OUTPUTS, CarOutput, CornerOutput, observe_free, observe_rims
 from .kernels.records import Corner

@@ -8,48 +8,32 @@ states asked for are kept.
 import numpy as np
 
 from ..jit import compiled, inlined
+from .buffer import (
+    CAR,
+    CAR_ROWS,
+    NOW,
+    REACH,
+    ROWS,
+    SLOPE,
+    STAGE,
+    STATES,
+    SUM,
+    body_of,
+    corner_of,
+    given_to,
+    keep_slope,
+    stage_state,
+)
 from .constrained import rim_accelerations, rim_corner
+from .contact import find_contacts, read_road
 from .direct import accelerations, chassis_attitude, free_corner
 from .forces import direction_of_travel
-from .kinematics import arm_pose, wheel_motion
-from .lanes import loader, storer
-from .records import Body, Corner, RimInput, State, WheelInput
-from .road import road_under
-
-STATES = len(State._fields)
-BODY_ROWS = len(Body._fields)
-CORNER_ROWS = len(Corner._fields)
-CAR_ROWS = BODY_ROWS + 4 * CORNER_ROWS
-
-# Rows of the buffer.
-_NOW = 0
-_STAGE = _NOW + STATES
-_SLOPE = _STAGE + STATES
-_SUM = _SLOPE + STATES
-_GIVEN = _SUM + STATES
-_CONTACT = _GIVEN + 4 * len(WheelInput._fields)
-_REACH = _CONTACT + 8
-_CAR = _REACH + 1
-_CORNERS = _CAR + BODY_ROWS
-ROWS = _CAR + CAR_ROWS
+from .records import RimInput, State
 
 _ANGLE_LIMIT = 1.5
 """rad: beyond it the polynomials of elementary.py lose accuracy and the car lies on its side."""
 _HEIGHT_LIMIT = 10.0
 """m"""
-
-load_body, load_corner, load_given = loader(Body), loader(Corner), loader(WheelInput)
-load_state, store_state = loader(State), storer(State)
-
-
-@inlined
-def _corner(buffer, index, lanes, lane):
-    return load_corner(buffer, _CORNERS + index * CORNER_ROWS, lanes, lane)
-
-
-@inlined
-def _given(buffer, index, lanes, lane):
-    return load_given(buffer, _GIVEN + index * 4, lanes, lane)
 
 
 @inlined
@@ -76,117 +60,67 @@ def slope_of(state, c, fl, fr, rl, rr):
 
 
 @inlined
-def _contact(corner, chassis, state, angle, rate):
-    """X of a wheel centre (m) and its rate (m/s)."""
-    wheel = wheel_motion(
-        corner, chassis, arm_pose(angle, rate), state.z, state.x_rate, state.z_rate
-    )
-    e, c = chassis.e_X, wheel.centre
-    return state.x + e[0] * c[0] + e[1] * c[1] + e[2] * c[2], wheel.velocity_X
+def free_car(buffer, LANES, j):
+    """Attitude, corners and accelerations of a lane's free car at the stage."""
+    state = stage_state(buffer, LANES, j)
+    chassis = chassis_attitude(state)
+    way = direction_of_travel(state.x_rate)
+    corner, given = corner_of(buffer, 0, LANES, j), given_to(buffer, 0, LANES, j)
+    fl = free_corner(corner, chassis, state, state.fl, state.fl_rate, given, way)
+    corner, given = corner_of(buffer, 1, LANES, j), given_to(buffer, 1, LANES, j)
+    fr = free_corner(corner, chassis, state, state.fr, state.fr_rate, given, way)
+    corner, given = corner_of(buffer, 2, LANES, j), given_to(buffer, 2, LANES, j)
+    rl = free_corner(corner, chassis, state, state.rl, state.rl_rate, given, way)
+    corner, given = corner_of(buffer, 3, LANES, j), given_to(buffer, 3, LANES, j)
+    rr = free_corner(corner, chassis, state, state.rr, state.rr_rate, given, way)
+    a = accelerations(body_of(buffer, LANES, j), chassis, fl, fr, rl, rr)
+    return chassis, fl, fr, rl, rr, a
 
 
 @inlined
-def _find_contacts(buffer, LANES):
-    """Where the four wheels are, for every lane."""
-    for j in range(LANES):
-        state = load_state(buffer, _STAGE, LANES, j)
-        chassis = chassis_attitude(state)
-        fl = _contact(_corner(buffer, 0, LANES, j), chassis, state, state.fl, state.fl_rate)
-        fr = _contact(_corner(buffer, 1, LANES, j), chassis, state, state.fr, state.fr_rate)
-        rl = _contact(_corner(buffer, 2, LANES, j), chassis, state, state.rl, state.rl_rate)
-        rr = _contact(_corner(buffer, 3, LANES, j), chassis, state, state.rr, state.rr_rate)
-        buffer[(_CONTACT + 0) * LANES + j], buffer[(_CONTACT + 1) * LANES + j] = fl
-        buffer[(_CONTACT + 2) * LANES + j], buffer[(_CONTACT + 3) * LANES + j] = fr
-        buffer[(_CONTACT + 4) * LANES + j], buffer[(_CONTACT + 5) * LANES + j] = rl
-        buffer[(_CONTACT + 6) * LANES + j], buffer[(_CONTACT + 7) * LANES + j] = rr
+def rims_at(u):
+    """Prescribed motions of the four wheel centres in a row of stage inputs."""
+    fl, fr = RimInput(u[0], u[4], u[8]), RimInput(u[1], u[5], u[9])
+    rl, rr = RimInput(u[2], u[6], u[10]), RimInput(u[3], u[7], u[11])
+    return fl, fr, rl, rr
 
 
 @inlined
-def _read_road(buffer, LANES, inputs, road, start, spacing):
-    """What is under each wheel and acts on it: the road at its X, on top of the post."""
-    for j in range(LANES):
-        for corner in range(4):
-            X = buffer[(_CONTACT + 2 * corner) * LANES + j]
-            X_rate = buffer[(_CONTACT + 2 * corner + 1) * LANES + j]
-            height, slope = road_under(road[corner % 2], start, spacing, X)
-            first = _GIVEN + 4 * corner
-            buffer[first * LANES + j] = inputs[corner] + height
-            buffer[(first + 1) * LANES + j] = inputs[4 + corner] + slope * X_rate
-            buffer[(first + 2) * LANES + j] = inputs[8 + corner]
-            buffer[(first + 3) * LANES + j] = inputs[12 + corner]
+def car_on_rims(buffer, LANES, j, rims, a_x, way, b, exact):
+    """Attitude, corners and accelerations of a lane's car on its rims at the stage."""
+    state = stage_state(buffer, LANES, j)
+    chassis = chassis_attitude(state)
+    z, z_rate = state.z, state.z_rate
+    fl = rim_corner(corner_of(buffer, 0, LANES, j), chassis, z, z_rate, rims[0], way, b)
+    fr = rim_corner(corner_of(buffer, 1, LANES, j), chassis, z, z_rate, rims[1], way, b)
+    rl = rim_corner(corner_of(buffer, 2, LANES, j), chassis, z, z_rate, rims[2], way, b)
+    rr = rim_corner(corner_of(buffer, 3, LANES, j), chassis, z, z_rate, rims[3], way, b)
+    a = rim_accelerations(body_of(buffer, LANES, j), chassis, fl, fr, rl, rr, a_x, exact)
+    return chassis, fl, fr, rl, rr, a
 
 
 @inlined
 def _free_slopes(buffer, LANES):
     """Derivative of every lane's stage state, free car."""
     for j in range(LANES):
-        body = load_body(buffer, _CAR, LANES, j)
-        state = load_state(buffer, _STAGE, LANES, j)
-        chassis = chassis_attitude(state)
-        way = direction_of_travel(state.x_rate)
-        fl = free_corner(
-            _corner(buffer, 0, LANES, j),
-            chassis,
-            state,
-            state.fl,
-            state.fl_rate,
-            _given(buffer, 0, LANES, j),
-            way,
-        )
-        fr = free_corner(
-            _corner(buffer, 1, LANES, j),
-            chassis,
-            state,
-            state.fr,
-            state.fr_rate,
-            _given(buffer, 1, LANES, j),
-            way,
-        )
-        rl = free_corner(
-            _corner(buffer, 2, LANES, j),
-            chassis,
-            state,
-            state.rl,
-            state.rl_rate,
-            _given(buffer, 2, LANES, j),
-            way,
-        )
-        rr = free_corner(
-            _corner(buffer, 3, LANES, j),
-            chassis,
-            state,
-            state.rr,
-            state.rr_rate,
-            _given(buffer, 3, LANES, j),
-            way,
-        )
-        a = accelerations(body, chassis, fl, fr, rl, rr)
-        slope = slope_of(state, a.chassis, a.fl, a.fr, a.rl, a.rr)
-        store_state(buffer, _SLOPE, LANES, j, slope)
+        a = free_car(buffer, LANES, j)[5]
+        slope = slope_of(stage_state(buffer, LANES, j), a.chassis, a.fl, a.fr, a.rl, a.rr)
+        keep_slope(buffer, LANES, j, slope)
 
 
 @inlined
 def _rim_slopes(buffer, LANES, u, exact):
     """Derivative of every lane's stage state, prescribed rims; u : one row of stage inputs."""
     # Read before the loop: a second array inside it might alias the buffer.
-    rim_fl, rim_fr = RimInput(u[0], u[4], u[8]), RimInput(u[1], u[5], u[9])
-    rim_rl, rim_rr = RimInput(u[2], u[6], u[10]), RimInput(u[3], u[7], u[11])
+    rims = rims_at(u)
     a_x, way, b = u[12], direction_of_travel(u[13]), u[14]
     for j in range(LANES):
-        body = load_body(buffer, _CAR, LANES, j)
-        state = load_state(buffer, _STAGE, LANES, j)
-        chassis = chassis_attitude(state)
-        z, z_rate = state.z, state.z_rate
-        fl = rim_corner(_corner(buffer, 0, LANES, j), chassis, z, z_rate, rim_fl, way, b)
-        fr = rim_corner(_corner(buffer, 1, LANES, j), chassis, z, z_rate, rim_fr, way, b)
-        rl = rim_corner(_corner(buffer, 2, LANES, j), chassis, z, z_rate, rim_rl, way, b)
-        rr = rim_corner(_corner(buffer, 3, LANES, j), chassis, z, z_rate, rim_rr, way, b)
+        _, fl, fr, rl, rr, a = car_on_rims(buffer, LANES, j, rims, a_x, way, b, exact)
         reach = min(min(fl.reach, fr.reach), min(rl.reach, rr.reach))
-        buffer[_REACH * LANES + j] = min(buffer[_REACH * LANES + j], reach)
-        a = rim_accelerations(body, chassis, fl, fr, rl, rr, a_x, exact)
+        buffer[REACH * LANES + j] = min(buffer[REACH * LANES + j], reach)
         # The arms follow from the chassis; their rows are not integrated.
-        slope = slope_of(state, a.chassis, 0.0, 0.0, 0.0, 0.0)
-        store_state(buffer, _SLOPE, LANES, j, slope)
+        slope = slope_of(stage_state(buffer, LANES, j), a.chassis, 0.0, 0.0, 0.0, 0.0)
+        keep_slope(buffer, LANES, j, slope)
 
 
 @inlined
@@ -196,18 +130,18 @@ def _begin(buffer, LANES, cars, states, first):
     for j in range(LANES):
         car = min(first + j, last)
         for row in range(CAR_ROWS):
-            buffer[(_CAR + row) * LANES + j] = cars[car, row]
+            buffer[(CAR + row) * LANES + j] = cars[car, row]
         for row in range(STATES):
-            buffer[(_NOW + row) * LANES + j] = states[car, row]
-        buffer[_REACH * LANES + j] = 1.0
+            buffer[(NOW + row) * LANES + j] = states[car, row]
+        buffer[REACH * LANES + j] = 1.0
 
 
 @inlined
 def _set_out(buffer, LANES):
     """First stage of a step: at its beginning."""
     for k in range(STATES * LANES):
-        buffer[_STAGE * LANES + k] = buffer[_NOW * LANES + k]
-        buffer[_SUM * LANES + k] = 0.0
+        buffer[STAGE * LANES + k] = buffer[NOW * LANES + k]
+        buffer[SUM * LANES + k] = 0.0
 
 
 @inlined
@@ -216,12 +150,12 @@ def _advance(buffer, LANES, stage, h):
     weight = h / 3.0 if stage == 1 or stage == 2 else h / 6.0
     ahead = 0.5 * h if stage < 2 else h
     for k in range(STATES * LANES):
-        slope = buffer[_SLOPE * LANES + k]
-        total = buffer[_SUM * LANES + k] + weight * slope
-        buffer[_SUM * LANES + k] = total
-        now = buffer[_NOW * LANES + k]
-        buffer[_STAGE * LANES + k] = now + ahead * slope
-        buffer[_NOW * LANES + k] = now + total if stage == 3 else now
+        slope = buffer[SLOPE * LANES + k]
+        total = buffer[SUM * LANES + k] + weight * slope
+        buffer[SUM * LANES + k] = total
+        now = buffer[NOW * LANES + k]
+        buffer[STAGE * LANES + k] = now + ahead * slope
+        buffer[NOW * LANES + k] = now + total if stage == 3 else now
 
 
 @inlined
@@ -234,7 +168,7 @@ def _keep(buffer, LANES, states_out, failed, first, sample):
     for j in range(LANES):
         car = first + j
         if car < states_out.shape[0]:
-            sound = abs(buffer[1 * LANES + j]) < _HEIGHT_LIMIT and buffer[_REACH * LANES + j] >= 0.0
+            sound = abs(buffer[1 * LANES + j]) < _HEIGHT_LIMIT and buffer[REACH * LANES + j] >= 0.0
             for row in range(2, 8):
                 sound = sound and abs(buffer[row * LANES + j]) < _ANGLE_LIMIT
             if not sound and failed[car] < 0:
@@ -270,8 +204,8 @@ def integrate_free(lanes, cars, states, inputs, steps, samples, road, start, spa
             _set_out(buffer, LANES)
             for stage in range(4):
                 given = inputs[k, (stage + 1) // 2]
-                _find_contacts(buffer, LANES)
-                _read_road(buffer, LANES, given, road, start, spacing)
+                find_contacts(buffer, LANES)
+                read_road(buffer, LANES, given, road, start, spacing)
                 _free_slopes(buffer, LANES)
                 _advance(buffer, LANES, stage, steps[k])
             sample = samples[k + 1]

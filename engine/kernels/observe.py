@@ -6,21 +6,12 @@ import numpy as np
 
 from ..frames import GRAVITY
 from ..jit import compiled, inlined
-from .constrained import rim_accelerations, rim_corner
-from .direct import accelerations, chassis_attitude, free_corner
+from .buffer import CAR, ROWS, STAGE, STATES, body_of, corner_of, given_to
+from .contact import find_contacts, read_road
 from .forces import bar_torque, direction_of_travel, strut
-from .integrate import (
-    BODY_ROWS,
-    CAR_ROWS,
-    CORNER_ROWS,
-    ROWS,
-    STATES,
-    _find_contacts,
-    _read_road,
-)
+from .integrate import car_on_rims, free_car, rims_at
 from .kinematics import convective_acceleration, pivot, turned
-from .lanes import loader, storer
-from .records import Body, Corner, RimInput, State, WheelInput
+from .lanes import storer
 from .vec3 import add, cross, scale, y_cross
 
 
@@ -60,8 +51,6 @@ class CornerOutput(NamedTuple):
 
 OUTPUTS = len(CarOutput._fields) + 4 * len(CornerOutput._fields)
 
-load_body, load_corner = loader(Body), loader(Corner)
-load_given, load_state = loader(WheelInput), loader(State)
 store_car, store_corner = storer(CarOutput), storer(CornerOutput)
 
 
@@ -153,66 +142,40 @@ def observe_free(car, states, inputs, road, start, spacing, out):
     car (CAR_ROWS,), states (n, 16), inputs (n, 16) as of `integrate_free`, out (n, OUTPUTS)
     """
     buffer = np.zeros(ROWS)
-    first_car = ROWS - CAR_ROWS
-    first_corner = first_car + BODY_ROWS
-    buffer[first_car:] = car
-    body = load_body(buffer, first_car, 1, 0)
-    corner_fl = load_corner(buffer, first_corner, 1, 0)
-    corner_fr = load_corner(buffer, first_corner + CORNER_ROWS, 1, 0)
-    corner_rl = load_corner(buffer, first_corner + 2 * CORNER_ROWS, 1, 0)
-    corner_rr = load_corner(buffer, first_corner + 3 * CORNER_ROWS, 1, 0)
+    buffer[CAR:] = car
+    corner_fl, corner_fr = corner_of(buffer, 0, 1, 0), corner_of(buffer, 1, 1, 0)
+    corner_rl, corner_rr = corner_of(buffer, 2, 1, 0), corner_of(buffer, 3, 1, 0)
     for i in range(states.shape[0]):
-        buffer[STATES : 2 * STATES] = states[i]
-        _find_contacts(buffer, 1)
-        _read_road(buffer, 1, inputs[i], road, start, spacing)
-        state = load_state(buffer, STATES, 1, 0)
-        chassis = chassis_attitude(state)
-        way = direction_of_travel(state.x_rate)
-        given_fl = load_given(buffer, 4 * STATES, 1, 0)
-        given_fr = load_given(buffer, 4 * STATES + 4, 1, 0)
-        given_rl = load_given(buffer, 4 * STATES + 8, 1, 0)
-        given_rr = load_given(buffer, 4 * STATES + 12, 1, 0)
-        fl = free_corner(corner_fl, chassis, state, state.fl, state.fl_rate, given_fl, way)
-        fr = free_corner(corner_fr, chassis, state, state.fr, state.fr_rate, given_fr, way)
-        rl = free_corner(corner_rl, chassis, state, state.rl, state.rl_rate, given_rl, way)
-        rr = free_corner(corner_rr, chassis, state, state.rr, state.rr_rate, given_rr, way)
-        a = accelerations(body, chassis, fl, fr, rl, rr)
+        buffer[STAGE : STAGE + STATES] = states[i]
+        find_contacts(buffer, 1)
+        read_road(buffer, 1, inputs[i], road, start, spacing)
+        chassis, fl, fr, rl, rr, a = free_car(buffer, 1, 0)
         _store(
             out[i],
-            _car_output(body, a.chassis, 0.0, fl, fr, rl, rr),
-            _free_output(corner_fl, chassis, fl, a.chassis, a.fl, given_fl),
-            _free_output(corner_fr, chassis, fr, a.chassis, a.fr, given_fr),
-            _free_output(corner_rl, chassis, rl, a.chassis, a.rl, given_rl),
-            _free_output(corner_rr, chassis, rr, a.chassis, a.rr, given_rr),
+            _car_output(body_of(buffer, 1, 0), a.chassis, 0.0, fl, fr, rl, rr),
+            _free_output(corner_fl, chassis, fl, a.chassis, a.fl, given_to(buffer, 0, 1, 0)),
+            _free_output(corner_fr, chassis, fr, a.chassis, a.fr, given_to(buffer, 1, 1, 0)),
+            _free_output(corner_rl, chassis, rl, a.chassis, a.rl, given_to(buffer, 2, 1, 0)),
+            _free_output(corner_rr, chassis, rr, a.chassis, a.rr, given_to(buffer, 3, 1, 0)),
         )
 
 
 @compiled
 def observe_rims(car, states, inputs, exact, out):
     """Outputs of one car in the rims mode; inputs (n, 15) as of `integrate_rims`."""
-    body = load_body(car, 0, 1, 0)
-    corner_fl = load_corner(car, BODY_ROWS, 1, 0)
-    corner_fr = load_corner(car, BODY_ROWS + CORNER_ROWS, 1, 0)
-    corner_rl = load_corner(car, BODY_ROWS + 2 * CORNER_ROWS, 1, 0)
-    corner_rr = load_corner(car, BODY_ROWS + 3 * CORNER_ROWS, 1, 0)
+    buffer = np.zeros(ROWS)
+    buffer[CAR:] = car
+    corner_fl, corner_fr = corner_of(buffer, 0, 1, 0), corner_of(buffer, 1, 1, 0)
+    corner_rl, corner_rr = corner_of(buffer, 2, 1, 0), corner_of(buffer, 3, 1, 0)
     for i in range(states.shape[0]):
+        buffer[STAGE : STAGE + STATES] = states[i]
         u = inputs[i]
-        b = u[14]
-        way = direction_of_travel(u[13])
-        state = load_state(states[i], 0, 1, 0)
-        chassis = chassis_attitude(state)
-        z, z_rate = state.z, state.z_rate
-        rim_fl, rim_fr = RimInput(u[0], u[4], u[8]), RimInput(u[1], u[5], u[9])
-        rim_rl, rim_rr = RimInput(u[2], u[6], u[10]), RimInput(u[3], u[7], u[11])
-        fl = rim_corner(corner_fl, chassis, z, z_rate, rim_fl, way, b)
-        fr = rim_corner(corner_fr, chassis, z, z_rate, rim_fr, way, b)
-        rl = rim_corner(corner_rl, chassis, z, z_rate, rim_rl, way, b)
-        rr = rim_corner(corner_rr, chassis, z, z_rate, rim_rr, way, b)
-        a = rim_accelerations(body, chassis, fl, fr, rl, rr, u[12], exact)
+        way, b = direction_of_travel(u[13]), u[14]
+        chassis, fl, fr, rl, rr, a = car_on_rims(buffer, 1, 0, rims_at(u), u[12], way, b, exact)
         c, F = a.chassis, a.traction
         _store(
             out[i],
-            _car_output(body, c, F, fl, fr, rl, rr),
+            _car_output(body_of(buffer, 1, 0), c, F, fl, fr, rl, rr),
             _rim_output(corner_fl, chassis, fl, c, a.fl, a.fl_load, F, b),
             _rim_output(corner_fr, chassis, fr, c, a.fr, a.fr_load, F, b),
             _rim_output(corner_rl, chassis, rl, c, a.rl, a.rl_load, F, b),

@@ -1,0 +1,62 @@
+"""Rows of the lanes' buffer: where a group of cars keeps states, inputs and its own numbers."""
+
+from ..jit import inlined
+from .lanes import loader, storer
+from .records import Body, Corner, State, WheelInput
+
+STATES = len(State._fields)
+BODY_ROWS = len(Body._fields)
+CORNER_ROWS = len(Corner._fields)
+CAR_ROWS = BODY_ROWS + 4 * CORNER_ROWS
+"""Numbers that describe one car to the kernels: body, then corners fl, fr, rl, rr."""
+WHEEL_ROWS = len(WheelInput._fields)
+
+NOW = 0
+"""State at the beginning of the step."""
+STAGE = NOW + STATES
+"""State of the stage being evaluated."""
+SLOPE = STAGE + STATES
+"""Its derivative."""
+SUM = SLOPE + STATES
+"""Weighted derivatives of the step so far."""
+GIVEN = SUM + STATES
+"""A WheelInput for each corner."""
+CONTACT = GIVEN + 4 * WHEEL_ROWS
+"""X of each wheel centre and its rate."""
+REACH = CONTACT + 8
+"""Least reach since the beginning, rims mode."""
+CAR = REACH + 1
+ROWS = CAR + CAR_ROWS
+
+_load_body, _load_corner, _load_given = loader(Body), loader(Corner), loader(WheelInput)
+_load_state, _store_state = loader(State), storer(State)
+
+
+@inlined
+def body_of(buffer, LANES, lane):
+    """Sprung mass and bars of a lane's car."""
+    return _load_body(buffer, CAR, LANES, lane)
+
+
+@inlined
+def corner_of(buffer, index, LANES, lane):
+    """One corner of a lane's car."""
+    return _load_corner(buffer, CAR + BODY_ROWS + index * CORNER_ROWS, LANES, lane)
+
+
+@inlined
+def given_to(buffer, index, LANES, lane):
+    """What acts on one wheel of a lane's car."""
+    return _load_given(buffer, GIVEN + index * WHEEL_ROWS, LANES, lane)
+
+
+@inlined
+def stage_state(buffer, LANES, lane):
+    """State of a lane's car at the stage."""
+    return _load_state(buffer, STAGE, LANES, lane)
+
+
+@inlined
+def keep_slope(buffer, LANES, lane, slope):
+    """Store the derivative of a lane's state."""
+    _store_state(buffer, SLOPE, LANES, lane, slope)
