@@ -91,6 +91,7 @@ class Visitor:
     """A browser of its own with the page open."""
 
     page: Page
+    in_3d: bool = True
     expected: list[str] = field(default_factory=list)
     complaints: list[str] = field(default_factory=list)
 
@@ -102,7 +103,8 @@ class Visitor:
 
     def wait_until_drawn(self) -> None:
         """Until a simulated ride is drawn, in charts and in 3D."""
-        self.until("ridetune.state('now') !== null && ridetune.scene.built")
+        scene = "ridetune.scene.built" if self.in_3d else "true"
+        self.until(f"ridetune.state('now') !== null && {scene}")
 
     def look(self, expression: str) -> Any:
         """Value of an expression in the page; `ridetune` is window.ridetune."""
@@ -201,14 +203,19 @@ def service(tmp_path_factory) -> Iterator[Service]:
 
 @pytest.fixture
 def visit(browser) -> Iterator[Callable[[], Visitor]]:
-    """Makes visitors; each has cookies, and so a session, of its own."""
+    """Makes visitors; each has cookies, and so a session, of its own.
+
+    Drawing in software is slow: the 3D view stays empty in stories that are not about it.
+    """
     contexts: list[BrowserContext] = []
     visitors: list[Visitor] = []
 
-    def arrive() -> Visitor:
+    def arrive(in_3d: bool = False) -> Visitor:
         context = browser.new_context(viewport={"width": 1366, "height": 768})
         contexts.append(context)
-        visitor = Visitor(context.new_page())
+        visitor = Visitor(context.new_page(), in_3d)
+        if not in_3d:
+            visitor.page.route("**/viewer/*", lambda route: route.fulfill(body="<!doctype html>"))
         visitors.append(visitor)
         visitor.page.on(
             "console",
@@ -228,7 +235,14 @@ def visit(browser) -> Iterator[Callable[[], Visitor]]:
 
 @pytest.fixture
 def visitor(visit, service) -> Visitor:
+    """On the page, without the 3D view."""
     return visit().open(service.address)
+
+
+@pytest.fixture
+def spectator(visit, service) -> Visitor:
+    """On the page, with the 3D view."""
+    return visit(in_3d=True).open(service.address)
 
 
 def short_run(samples: int = 700, first: int = 900) -> bytes:

@@ -41,67 +41,60 @@ def seek(visitor, time):
     )
 
 
-def test_a_slider_moves_charts_and_car(visitor):
-    seek(visitor, 6.0)
-    before, body = visitor.line("chassis.pitch"), position(visitor, "/car/body")
-    press(visitor, "#slider-rear-suspension-stiffness", *["PageUp"] * 4)
-    visitor.settled()
-    assert visitor.value("rear.suspension.stiffness") == pytest.approx(28e3)
-    assert np.abs(visitor.line("chassis.pitch") - before).max() > 0.01
-    assert np.abs(position(visitor, "/car/body") - body).max() > 1e-5
+def test_a_slider_moves_charts_and_car(spectator):
+    seek(spectator, 6.0)
+    before, body = spectator.line("chassis.pitch"), position(spectator, "/car/body")
+    press(spectator, "#slider-rear-suspension-stiffness", *["PageUp"] * 4)
+    spectator.settled()
+    assert spectator.value("rear.suspension.stiffness") == pytest.approx(28e3)
+    assert np.abs(spectator.line("chassis.pitch") - before).max() > 0.01
+    assert np.abs(position(spectator, "/car/body") - body).max() > 1e-5
     # The compared car stays where it was, and one press brings the slider back to it.
-    np.testing.assert_array_equal(visitor.line("chassis.pitch", "reference"), before)
-    visitor.click("#reset-all")
-    visitor.settled()
-    np.testing.assert_array_equal(visitor.line("chassis.pitch"), before)
+    np.testing.assert_array_equal(spectator.line("chassis.pitch", "reference"), before)
+    spectator.click("#reset-all")
+    spectator.settled()
+    np.testing.assert_array_equal(spectator.line("chassis.pitch"), before)
 
 
-def test_the_pivot_moves_in_3d(visitor):
-    before = visitor.picture()
-    press(visitor, "#slider-front-pivot-distance", *["PageUp"] * 5)
-    visitor.settled()
-    assert changed_pixels(visitor.picture(), before) > 5e-4
-
-
-def test_a_pivot_is_dragged_in_3d(visitor):
+def test_a_pivot_is_dragged_in_3d(spectator):
     """The handle's green square moves the pivot along the car and up."""
-    visitor.click("[data-camera=side]")
-    plain = visitor.picture().astype(int)
-    visitor.click("#grips")
-    picture = visitor.picture().astype(int)
+    spectator.click("[data-camera=side]")
+    plain = spectator.picture().astype(int)
+    spectator.click("#grips")
+    picture = spectator.picture().astype(int)
     green = (picture[..., 1] > picture[..., 0] + 40) & (picture[..., 1] > picture[..., 2] + 20)
     rows, columns = np.nonzero(green & (np.abs(picture - plain).max(axis=2) > 60))
     assert rows.size > 10
     first = columns < columns.min() + 12
-    box, mouse = visitor.element("#view iframe").bounding_box(), visitor.page.mouse
+    box, mouse = spectator.element("#view iframe").bounding_box(), spectator.page.mouse
     x, y = box["x"] + columns[first].mean(), box["y"] + rows[first].mean()
-    before = [visitor.value(f"front.pivot.{what}") for what in ("distance", "angle")]
+    before = [spectator.value(f"front.pivot.{what}") for what in ("distance", "angle")]
     mouse.move(x, y)
-    visitor.page.wait_for_timeout(200)
+    spectator.page.wait_for_timeout(200)
     mouse.down()
     for step in range(6):
         mouse.move(x - 6 * step, y - 3 * step)
-        visitor.page.wait_for_timeout(60)
+        spectator.page.wait_for_timeout(60)
     mouse.up()
-    visitor.until(f"ridetune.state('values')['front.pivot.distance'] > {before[0]} + 0.05")
-    assert visitor.value("front.pivot.angle") > before[1]
-    visitor.settled()
+    spectator.until(f"ridetune.state('values')['front.pivot.distance'] > {before[0]} + 0.05")
+    assert spectator.value("front.pivot.angle") > before[1]
+    spectator.settled()
 
 
-def test_playing_moves_the_picture_and_pausing_holds_it(visitor):
-    visitor.page.select_option("#ride", "manoeuvre 2")
-    visitor.until("ridetune.state('now') && ridetune.state('now').head.mode === 'road'")
-    seek(visitor, 12.0)
-    here = visitor.picture()
-    assert changed_pixels(visitor.picture(), here) == 0.0
-    seek(visitor, 12.6)
-    assert changed_pixels(visitor.picture(), here) > 5e-4
-    visitor.click("#play")
-    visitor.until("ridetune.clock.time > 12.8")
-    visitor.click("#play")
-    stopped = visitor.look("ridetune.clock.time")
-    visitor.page.wait_for_timeout(300)
-    assert visitor.look("ridetune.clock.time") == stopped
+def test_playing_moves_the_picture_and_pausing_holds_it(spectator):
+    spectator.page.select_option("#ride", "manoeuvre 2")
+    spectator.until("ridetune.state('now') && ridetune.state('now').head.mode === 'road'")
+    seek(spectator, 12.0)
+    here = spectator.picture()
+    assert changed_pixels(spectator.picture(), here) == 0.0
+    seek(spectator, 12.6)
+    assert changed_pixels(spectator.picture(), here) > 5e-4
+    spectator.click("#play")
+    spectator.until("ridetune.clock.time > 12.8")
+    spectator.click("#play")
+    stopped = spectator.look("ridetune.clock.time")
+    spectator.page.wait_for_timeout(300)
+    assert spectator.look("ridetune.clock.time") == stopped
 
 
 def test_charts_zoom_together_and_show_all_again(visitor):
@@ -167,31 +160,31 @@ def test_the_seven_dof_model_shows_what_the_arms_add(visitor):
     assert abs(visitor.line("chassis.pitch", "reference")[squat].mean()) < 0.1
 
 
-def test_keys_play_scrub_and_leave_fields_alone(visitor):
-    keyboard = visitor.page.keyboard
-    visitor.element("body").press("ArrowRight")
-    assert visitor.look("ridetune.clock.time") == pytest.approx(0.1)
+def test_keys_play_scrub_and_leave_fields_alone(spectator):
+    keyboard = spectator.page.keyboard
+    spectator.element("body").press("ArrowRight")
+    assert spectator.look("ridetune.clock.time") == pytest.approx(0.1)
     keyboard.press("Shift+ArrowRight")
-    assert visitor.look("ridetune.clock.time") == pytest.approx(1.1)
+    assert spectator.look("ridetune.clock.time") == pytest.approx(1.1)
     keyboard.press("End")
-    assert visitor.look("ridetune.clock.time") == pytest.approx(20.0, abs=0.01)
+    assert spectator.look("ridetune.clock.time") == pytest.approx(20.0, abs=0.01)
     keyboard.press("Home")
     keyboard.press("Space")
-    visitor.until("ridetune.clock.playing && ridetune.clock.time > 0")
+    spectator.until("ridetune.clock.playing && ridetune.clock.time > 0")
     keyboard.press("Space")
-    assert not visitor.look("ridetune.clock.playing")
+    assert not spectator.look("ridetune.clock.playing")
     # A slider's arrows are its own, a field's keys too.
-    time = visitor.look("ridetune.clock.time")
-    before = visitor.value(STIFFNESS)
-    press(visitor, "#slider-front-suspension-stiffness", "ArrowRight")
-    assert visitor.value(STIFFNESS) == pytest.approx(before + 100.0)
-    press(visitor, "#value-front-suspension-stiffness", "ArrowLeft", "Home")
-    assert visitor.look("ridetune.clock.time") == time
+    time = spectator.look("ridetune.clock.time")
+    before = spectator.value(STIFFNESS)
+    press(spectator, "#slider-front-suspension-stiffness", "ArrowRight")
+    assert spectator.value(STIFFNESS) == pytest.approx(before + 100.0)
+    press(spectator, "#value-front-suspension-stiffness", "ArrowLeft", "Home")
+    assert spectator.look("ridetune.clock.time") == time
     # The 3D view hands the keys on.
-    visitor.element("#view iframe").click(position={"x": 200, "y": 200})
+    spectator.element("#view iframe").click(position={"x": 200, "y": 200})
     keyboard.press("Space")
-    visitor.until("ridetune.clock.playing")
-    visitor.settled()
+    spectator.until("ridetune.clock.playing")
+    spectator.settled()
 
 
 def test_every_control_is_reached_by_tab_and_has_a_name(visitor):
@@ -238,15 +231,15 @@ def test_two_browsers_do_not_see_each_other(visit, service):
     assert other.element("a[href='/']").is_visible()
 
 
-def test_another_car_changes_sliders_and_scene(visitor):
-    visitor.click("#tab-car")
-    before = visitor.picture()
-    visitor.page.get_by_label("Reference cars").select_option("vw-vanagon")
-    visitor.until("ridetune.state('vehicle').name.includes('Vanagon')")
-    visitor.settled()
-    assert changed_pixels(visitor.picture(), before) > 5e-3
-    track = visitor.look("ridetune.state('vehicle').front.track")
-    assert position(visitor, "/car/wheel_fl")[1] == pytest.approx(track / 2, abs=0.02)
+def test_another_car_changes_sliders_and_scene(spectator):
+    spectator.click("#tab-car")
+    before = spectator.picture()
+    spectator.page.get_by_label("Reference cars").select_option("vw-vanagon")
+    spectator.until("ridetune.state('vehicle').name.includes('Vanagon')")
+    spectator.settled()
+    assert changed_pixels(spectator.picture(), before) > 5e-3
+    track = spectator.look("ridetune.state('vehicle').front.track")
+    assert position(spectator, "/car/wheel_fl")[1] == pytest.approx(track / 2, abs=0.02)
 
 
 def test_an_impossible_car_is_refused_in_words(visitor):
@@ -281,18 +274,18 @@ def test_the_page_waits_while_the_service_compiles(visit, service):
     assert not banner.is_visible()
 
 
-def test_the_3d_view_comes_back_after_a_lost_connection(visitor):
-    seek(visitor, 8.0)
-    before = visitor.picture()
-    visitor.scene_frame().evaluate("() => window.bridge.retry()")
-    visitor.until("ridetune.scene.connections === 2 && ridetune.scene.built")
-    assert changed_pixels(visitor.picture(), before) < 1e-3
+def test_the_3d_view_comes_back_after_a_lost_connection(spectator):
+    seek(spectator, 8.0)
+    before = spectator.picture()
+    spectator.scene_frame().evaluate("() => window.bridge.retry()")
+    spectator.until("ridetune.scene.connections === 2 && ridetune.scene.built")
+    assert changed_pixels(spectator.picture(), before) < 1e-3
 
 
 def test_the_page_goes_on_when_the_service_has_been_away(visit, tmp_path):
     service = Service(tmp_path / "data")
     try:
-        visitor = visit().open(service.address)
+        visitor = visit(in_3d=True).open(service.address)
         visitor.expect(*AWAY)
         service.stop(signal.SIGKILL)
         press(visitor, "#slider-front-suspension-stiffness", "PageUp")
