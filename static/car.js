@@ -95,7 +95,8 @@ async function change(path, value, field) {
   }
 }
 
-async function load(file) {
+/** A vehicle file, or the vehicle of a fit. */
+export async function load(file) {
   let data;
   try {
     data = JSON.parse(await file.text());

@@ -34,7 +34,7 @@ function show() {
   lift.hidden = now?.mode === "rims";
   if (!now) {
     table.replaceChildren(h("p", { className: "empty" },
-      get("trouble") ?? "The numbers come with the first simulation."));
+      get("trouble")?.message ?? "The numbers come with the first simulation."));
     return;
   }
   const name = get("compare") === "7dof" ? "7-DOF model" : "Baseline";

@@ -1,7 +1,7 @@
 // Identification: choose runs and free parameters, watch the fit, read it, apply it.
 
 import * as api from "./api.js";
-import { DETERMINED, isBounded } from "./controls.js";
+import { DETERMINED, isBounded, withValues } from "./controls.js";
 import { percent, short } from "./comfort.js";
 import { costChart } from "./cost.js";
 import { $, breakable, fileName, h, saveFile, symbol } from "./dom.js";
@@ -80,6 +80,7 @@ async function start() {
   }
   const names = get("parameters").map(({ name }) => name);
   const body = {
+    vehicle: withValues(get("vehicle"), get("values")),
     runs: runs.map(({ id }) => id),
     free: names.filter((name) => !choice.fixed.has(name)),
     traction: choice.traction,
@@ -88,7 +89,6 @@ async function start() {
   if (Object.keys(choice.bounds).length) body.bounds = choice.bounds;
   holdouts = Object.fromEntries(runsAs("holdout").map((run) => [run.id, null]));
   try {
-    await hooks.saved();
     job = await api.identify(body);
   } catch (error) {
     if (error.lost) set({ online: false });

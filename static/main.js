@@ -61,9 +61,11 @@ function build() {
   ride.build();
   charts.build(() => want("now", "reference"));
   comfort.build();
-  measurements.build(() => select("tab-measurements"));
+  measurements.build({
+    open: () => select("tab-measurements"), takeVehicle: car.load,
+  });
   identification.build({
-    open: () => select("tab-identification"), apply: applyFit, saved: save,
+    open: () => select("tab-identification"), apply: applyFit,
   });
   car.build();
   scene.build(sid, { askForCar: () => want("scene") });
@@ -90,6 +92,7 @@ function follow() {
     const run = state.now ?? state.measured;
     if (run) timeline.setRange(run.time[0], run.time[run.time.length - 1]);
   });
+  on("trouble", (state) => { if (state.trouble?.status === 404) lookAgain(); });
   on("now trouble ready online", status);
   on("ready online", (state) => {
     if (!state.online || !state.ready) settle();
@@ -138,6 +141,15 @@ async function save() {
 }
 const saveSoon = debounced(save, SAVE_AFTER);
 window.addEventListener("pagehide", save);
+
+/** Something is gone: a file deleted in another tab, or the whole session. */
+async function lookAgain() {
+  try {
+    set({ measurements: (await api.session()).measurements });
+  } catch (error) {
+    lost(error);
+  }
+}
 
 async function setBaseline() {
   const vehicle = controls.withValues(get("vehicle"), get("values"));

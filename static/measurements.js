@@ -14,11 +14,11 @@ const MEASURED = "#c9ced6";
 let selected = null;
 let failures = [];
 let plot = null;
-let openTab = () => {};
+let hooks = {};
 const parts = {};
 
-export function build(open) {
-  openTab = open;
+export function build(callbacks) {
+  hooks = callbacks;
   parts.list = h("div", { className: "measurement-list scrolls" });
   parts.detail = h("div", { className: "measurement-detail scrolls" });
   parts.file = h("input", {
@@ -44,8 +44,13 @@ export function build(open) {
     event.preventDefault();
     depth = 0;
     drop.hidden = true;
-    openTab();
-    add([...event.dataTransfer.files]);
+    const files = [...event.dataTransfer.files];
+    const isVehicle = (file) => file.name.toLowerCase().endsWith(".json");
+    files.filter(isVehicle).forEach(hooks.takeVehicle);
+    const recordings = files.filter((file) => !isVehicle(file));
+    if (!recordings.length) return;
+    hooks.open();
+    add(recordings);
   });
   on("measurements", show);
   show();

@@ -44,6 +44,7 @@ export function build(sid, { askForCar }) {
     if (detail.state === "scene") {
       parts = new Set(detail.names);
       seen.built = parts.has("/car/body");
+      frame.classList.toggle("empty-frame", !seen.built);
       shownRoad = null;
       shownGhost = null;
       shownGrips = null;
@@ -61,6 +62,7 @@ export function build(sid, { askForCar }) {
   });
   const query = new URLSearchParams(location.search).get("fixedDpr");
   frame = h("iframe", {
+    className: "empty-frame",
     title: "3D view of the car; drag to turn it",
     src: `/s/${sid}/viewer/${query ? `?fixedDpr=${encodeURIComponent(query)}` : ""}`,
   });

@@ -126,5 +126,5 @@ function failed(error) {
   const box = $("#chart-note");
   box.hidden = !error;
   box.textContent = error ? error.message : "";
-  set({ trouble: error ? error.message : null });
+  set({ trouble: error });
 }
