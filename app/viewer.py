@@ -3,26 +3,24 @@
 viser runs a websocket server of its own on a loopback port; nothing else of it is used. Its
 single-file page is served here with a bridge script in front of it, and only the websocket is
 passed on. So there is one origin and one port, and nobody gets at a car without its session.
+viser is imported with the first view: it takes longer to load than the rest of the service.
 """
 
 import asyncio
 import threading
 import time
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 
-import rich
-import viser
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.concurrency import run_in_threadpool
 from starlette.websockets import WebSocket
-from viser import _messages as messages
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, WebSocketException
 
 from ..engine.vehicle import Vehicle
-from . import scene
 from .access import session_of
 from .errors import NotFound
 from .package_files import package_folder
@@ -40,6 +38,10 @@ class Viewer:
     """One session's viser server and who watches it."""
 
     def __init__(self):
+        import rich
+        import viser
+        from viser import _messages as messages
+
         rich.get_console().quiet = True
         self.server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         self.watchers = 0
@@ -80,9 +82,11 @@ class Viewers:
 
     def show(self, sid: str, vehicle: Vehicle) -> None:
         """Put a vehicle on the stage; the browser shapes the road from the histories."""
+        from .scene import build
+
         server = self.start(sid).server
         with server.atomic():
-            scene.build(server, vehicle)
+            build(server, vehicle)
 
     def watch(self, sid: str, tabs: int) -> Viewer:
         """Count a tab in (+1) or out (-1)."""
@@ -114,8 +118,11 @@ class Viewers:
 
 @cache
 def _client_page() -> str:
-    build = Path(viser.__file__).parent / "client" / "build" / "index.html"
-    return build.read_text(encoding="utf-8")
+    package = find_spec("viser")
+    if package is None or package.origin is None:
+        raise ModuleNotFoundError("The 3D view needs viser; install the project's requirements.")
+    page = Path(package.origin).parent / "client" / "build" / "index.html"
+    return page.read_text(encoding="utf-8")
 
 
 @router.get("/s/{sid}/viewer/", include_in_schema=False)
