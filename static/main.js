@@ -54,7 +54,9 @@ async function start() {
 }
 
 function build() {
-  const select = tabs($("#workbench [role=tablist]"));
+  const select = tabs($("#workbench [role=tablist]"), (id) => {
+    if (id === "tab-identification") identification.opened();
+  });
   timeline.build();
   timeline.listenToKeys();
   controls.build({ onBaseline: setBaseline });
@@ -81,7 +83,7 @@ function follow() {
     want("now", ...(get("compare") === "7dof" ? ["reference"] : []));
   });
   on("baseline compare", () => want("reference"));
-  on("liftOff", () => want("now", "reference"));
+  on("liftOff traction", () => want("now", "reference"));
   on("vehicle", () => want("now", "scene", "reference"));
   on("ride road", () => {
     set({ now: null, reference: null, measured: null });

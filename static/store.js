@@ -8,6 +8,7 @@
 //   measurements, vehicles, manoeuvres, roads   lists of the service
 //   ride         {kind: "measurement", id} or {kind: "manoeuvre", key}
 //   road         null (as the manoeuvre says) or a road description
+//   traction     how a measured ride gets its traction, "exact" or "paper"
 //   liftOff      wheels may leave the road
 //   compare      "baseline", "7dof" or "none"
 //   now, reference, measured   runs (see api.js) of the ride, or null

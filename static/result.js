@@ -1,0 +1,130 @@
+// What an identification found, and how far it is while it runs.
+
+import { percent, short } from "./comfort.js";
+import { DETERMINED, isBounded } from "./controls.js";
+import { costChart } from "./cost.js";
+import { $, breakable, fileName, h, saveFile, symbol } from "./dom.js";
+import { get } from "./store.js";
+import * as units from "./units.js";
+
+const WELL = { yes: "well", weakly: "weakly", no: "not" };
+const STATES = {
+  queued: "Waiting for a worker …",
+  running: "Fitting …",
+  done: "Done",
+  failed: "Failed",
+  cancelled: "Cancelled",
+};
+
+let cost = null;
+
+/** The view of a job, or of none; `apply(result)` moves the sliders. */
+export function view(job, holdouts, apply) {
+  cost = null;
+  if (!job) {
+    return h("p", { className: "empty" },
+      "No fit yet. “Identify” fits the twelve parameters to the runs marked “fit” and takes a " +
+      "few seconds.");
+  }
+  const { result } = job;
+  cost = costChart(result ? 92 : 150);
+  if (!result) return running(job);
+  return h("div", { className: "fit" },
+    h("div", { className: "fit-main scrolls" },
+      h("p", { className: `outcome ${job.state}`, id: "outcome" }, outcome(job)),
+      estimates(result),
+      result.warnings.length
+        ? h("ul", { className: "warnings" }, result.warnings.map((text) => h("li", {}, text)))
+        : null),
+    h("div", { className: "fit-side scrolls" },
+      h("button", { type: "button", id: "apply", className: "primary wide",
+        on: { click: () => apply(result) } }, "Apply to sliders"),
+      scores(job, holdouts),
+      h("button", { type: "button", className: "wide", title: "fit.json, also for the command line",
+        on: { click: () => saveFile(result, `${fileName(job.runs[0].name)}-fit.json`) } },
+        "Save fit"),
+      h("h3", {}, "Cost"), cost.element, h("p", { className: "hint", id: "cost-now" })));
+}
+
+/** While it runs, or after it was stopped: the curve and the best car so far. */
+function running(job) {
+  return h("div", { className: "fit" },
+    h("div", { className: "fit-main scrolls" },
+      h("p", { className: `outcome ${job.state}`, id: "outcome" }, outcome(job)),
+      job.error ? h("div", { className: "problem", role: "alert" },
+        h("strong", {}, "The identification failed"), h("p", {}, job.error.detail)) : null,
+      h("h3", {}, "Cost"), cost.element, h("p", { className: "hint", id: "cost-now" })),
+    h("div", { className: "fit-side scrolls" }, h("h3", {}, "Best so far"),
+      h("table", { className: "best" }, h("tbody", { id: "best" }))));
+}
+
+function outcome(job) {
+  if (!job.result) return STATES[job.state];
+  const { result } = job;
+  return `${result.outcome} ${units.number(result.seconds, 2)} s, ${result.simulations} simulations.`;
+}
+
+/** Only numbers and the curve move while the fit runs. */
+export function advance(job) {
+  if (!job || !cost) return;
+  const { progress } = job;
+  const history = job.result?.cost_history ?? progress?.cost_history ?? [];
+  cost.show(history);
+  const last = history.at(-1) ?? progress?.cost;
+  const simulations = job.result?.simulations ?? progress?.simulations ?? 0;
+  $("#best")?.replaceChildren(...Object.entries(progress?.parameters ?? {}).map(([name, value]) => {
+    const row = units.parameter(name);
+    return h("tr", {}, h("th", { scope: "row", title: row.label }, symbol(row.symbol)),
+      h("td", {}, units.number(value * row.display_factor)),
+      h("td", { className: "unit" }, row.display_unit));
+  }));
+  $("#cost-now").textContent = last === undefined || last === null ? "Not started yet."
+    : `${units.number(last, 4)} after ${history.length} steps, ${simulations} simulations`;
+}
+
+function estimates(result) {
+  return h("table", { className: "estimates" },
+    h("thead", {}, h("tr", {},
+      ["Parameter", "Value", "Unit", "95 % interval", "Start", "Determined"].map((text) =>
+        h("th", { scope: "col", className: text === "Start" ? "long" : "" }, text)))),
+    h("tbody", {}, result.parameters.map((estimate) => {
+      const row = units.parameter(estimate.name);
+      const factor = row.display_factor;
+      const interval = estimate.confidence_interval;
+      return h("tr", {},
+        h("th", { scope: "row", title: row.label }, symbol(row.symbol), " ",
+          h("span", { className: "soft long" }, row.label)),
+        h("td", { className: "strong" }, units.number(estimate.value * factor)),
+        h("td", { className: "unit" }, row.display_unit),
+        h("td", { className: "span" }, isBounded(interval)
+          ? `${units.number(interval[0] * factor, 3)} … ${units.number(interval[1] * factor, 3)}`
+          : "unbounded"),
+        h("td", { className: "soft long" }, units.number(estimate.start * factor)),
+        h("td", {}, h("span", {
+          className: `determined ${estimate.determined}`, title: DETERMINED[estimate.determined],
+        }, WELL[estimate.determined])));
+    })));
+}
+
+/** Fit percent of every run, fitted or held out. */
+function scores(job, holdouts) {
+  const { result } = job;
+  const fitted = job.runs.map((run) => [run.name, "fitted",
+    result.fit_percent[run.name] ?? result.fit_percent[run.id]]);
+  const names = new Map(get("measurements").map(({ id, name }) => [id, name]));
+  const unseen = Object.entries(holdouts).map(([id, score]) =>
+    [names.get(id) ?? id, "held out", score]);
+  const channels = [...new Set([...fitted, ...unseen].flatMap(([, , score]) =>
+    score && typeof score === "object" ? Object.keys(score) : []))];
+  return h("table", { className: "scores" },
+    h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Fit, %"),
+      channels.map((channel) => h("th", { scope: "col" }, short(channel))))),
+    h("tbody", {}, [...fitted, ...unseen].map(([name, role, score]) =>
+      h("tr", { className: role === "fitted" ? "" : "held-out" },
+        h("th", { scope: "row", title: name }, h("span", { className: "run-name" }, breakable(name.replace(/\.\w+$/, ""))),
+          h("span", { className: "soft" }, ` ${role}`)),
+        typeof score === "string"
+          ? h("td", { colSpan: channels.length || 1 }, score)
+          : channels.map((channel) => h("td", {},
+            score ? percent(score[channel]).replace(" %", "") : "…"))))));
+}

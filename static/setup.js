@@ -1,0 +1,104 @@
+// What an identification is told: which runs, which parameters are free, between which bounds.
+
+import { breakable, h, symbol } from "./dom.js";
+import { get, set } from "./store.js";
+import * as units from "./units.js";
+
+const ROLES = { fit: "fit", holdout: "hold out", no: "leave out" };
+/** What is chosen: the role of each run, free parameters, bounds that differ from the default. */
+export const choice = { roles: {}, fixed: new Set(), bounds: {} };
+
+/** How a run is used: the first usable one is fitted, the others are held out. */
+function roleOf(run) {
+  if (!run.usable_for_identification) return "no";
+  if (choice.roles[run.id]) return choice.roles[run.id];
+  const usable = get("measurements").filter((m) => m.usable_for_identification);
+  return usable[0] === run || usable.length === 1 ? "fit" : "holdout";
+}
+
+export const runsAs = (role) => get("measurements").filter((run) => roleOf(run) === role);
+
+/** The set-up view; `redraw` shows it again after a choice that changes it. */
+export function view(redraw) {
+  const runs = get("measurements");
+  return h("div", { className: "setup scrolls" },
+    h("section", {},
+      h("h3", {}, "Runs"),
+      runs.length
+        ? h("table", { className: "runs" }, h("tbody", {}, runs.map(runRow)))
+        : h("p", { className: "empty" }, "No measurement yet; add one under Measurements."),
+      h("p", { className: "hint" },
+        "A run held out is not fitted: it shows how well the car predicts what it has not seen."),
+      h("label", { className: "block" }, "Traction",
+        select({ exact: "exact: the traction that gives the measured a_x",
+          paper: "paper: total mass times a_x (biased)" }, get("traction"),
+        (traction) => set({ traction }), { id: "traction" }))),
+    h("section", {},
+      h("h3", {}, "Free parameters"),
+      h("table", { className: "free" },
+        h("thead", {}, h("tr", {}, ["Free", "", "Start", "Lower", "Upper", ""].map((text) =>
+          h("th", { scope: "col" }, text)))),
+        h("tbody", {}, get("parameters").map((parameter) => freeRow(parameter, redraw))))));
+}
+
+function runRow(run) {
+  const role = roleOf(run);
+  return h("tr", {},
+    h("th", { scope: "row", title: run.name }, breakable(run.name)),
+    h("td", {}, run.usable_for_identification
+      ? select(ROLES, role, (value) => { choice.roles[run.id] = value; },
+        { "aria-label": `Use of ${run.name}` })
+      : h("span", { className: "badge", title: `It lacks ${run.missing.join(", ")}.` },
+        "not for fitting")));
+}
+
+function select(options, value, change, properties) {
+  const element = h("select", { ...properties, on: { change: () => change(element.value) } },
+    Object.entries(options).map(([key, text]) =>
+      h("option", { value: key, selected: key === value }, text)));
+  return element;
+}
+
+function freeRow(parameter, redraw) {
+  const { name, display_factor: factor, display_unit: unit } = parameter;
+  const start = get("values")[name];
+  const free = !choice.fixed.has(name);
+  const bounds = choice.bounds[name] ?? defaultBounds(parameter, start);
+  const bound = (index, word) => {
+    const field = h("input", {
+      type: "number", step: "any", disabled: !free, value: units.plain(bounds[index] * factor, 4),
+      "aria-label": `${word} bound of ${parameter.label}, ${unit}`,
+      on: {
+        change: () => {
+          const both = [...(choice.bounds[name] ?? bounds)];
+          both[index] = Number(field.value) / factor;
+          if (field.value === "") delete choice.bounds[name];
+          else choice.bounds[name] = both;
+          redraw();
+        },
+      },
+    });
+    return field;
+  };
+  return h("tr", { className: free ? "" : "off" },
+    h("td", {}, h("input", {
+      type: "checkbox", checked: free, "aria-label": `${parameter.label} is free`,
+      on: { change: (event) => {
+        if (event.target.checked) choice.fixed.delete(name);
+        else choice.fixed.add(name);
+        redraw();
+      } },
+    })),
+    h("th", { scope: "row", title: parameter.label }, symbol(parameter.symbol), " ",
+      h("span", { className: "soft long" }, parameter.label)),
+    h("td", {}, units.number(start * factor)),
+    h("td", {}, bound(0, "Lower")), h("td", {}, bound(1, "Upper")),
+    h("td", { className: "unit" }, unit));
+}
+
+/** The service's default bounds, shown before the fit; it applies its own when none is changed. */
+function defaultBounds(parameter, start) {
+  if (parameter.name.endsWith("pivot.angle")) return [-0.3, 1.3];
+  if (parameter.name.endsWith("pivot.distance")) return start < 0 ? [-10, -0.1] : [0.1, 10];
+  return [0.05 * start, 8 * start];
+}
