@@ -30,7 +30,8 @@ export function view(job, holdouts, apply) {
   cost = costChart(result ? 92 : 150);
   if (!result) return running(job);
   return h("div", { className: "fit" },
-    h("div", { className: "fit-main scrolls" },
+    h("div", { className: "fit-main scrolls", tabIndex: 0, role: "region",
+      "aria-label": "Identified parameters" },
       h("p", { className: `outcome ${job.state}`, id: "outcome" }, outcome(job)),
       estimates(result),
       result.warnings.length

@@ -36,7 +36,7 @@ export function view(redraw) {
     h("section", {},
       h("h3", {}, "Free parameters"),
       h("table", { className: "free" },
-        h("thead", {}, h("tr", {}, ["Free", "", "Start", "Lower", "Upper", ""].map((text) =>
+        h("thead", {}, h("tr", {}, ["Free", "Parameter", "Start", "Lower", "Upper", "Unit"].map((text) =>
           h("th", { scope: "col" }, text)))),
         h("tbody", {}, get("parameters").map((parameter) => freeRow(parameter, redraw))))));
 }
