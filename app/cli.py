@@ -125,7 +125,12 @@ def _describe_identify(command: Parser) -> None:
 
 
 def _describe_campaign(command: Parser) -> None:
-    command.add_argument("--plant", choices=("detailed", "concept"), default="concept")
+    command.add_argument(
+        "--plant",
+        choices=("detailed", "concept"),
+        default="concept",
+        help="car to drive; the detailed one is not available yet",
+    )
     _add_noise(command, "noise to add")
     command.add_argument("--seed", metavar="N", type=_seed, default=0, help="of the noise")
     command.add_argument("-o", "--output", metavar="DIR", required=True, help="folder to fill")

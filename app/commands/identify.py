@@ -11,11 +11,19 @@ from ...engine.identification import identify as fit_to_runs
 from ...engine.measurement import read_run
 from ...engine.problem import Problem
 from .inputs import bounds, find_vehicle, read_noise, starts
-from .output import print_fit_percent, print_table, print_warnings, significant, write_file
+from .output import (
+    print_fit_percent,
+    print_table,
+    print_warnings,
+    require_place,
+    significant,
+    write_file,
+)
 
 
 def identify(options: Namespace) -> None:
     """Fit the free parameters to all runs at once, print the report, write the fit."""
+    require_place(options.output)
     noise = read_noise(options.noise)
     problem = Problem.build(
         find_vehicle(options.vehicle),
@@ -30,9 +38,9 @@ def identify(options: Namespace) -> None:
     fit = fit_to_runs(problem, progress=_show if watched else None)
     if watched:
         print("\r\033[K", end="", file=sys.stderr)
+    _report(fit)
     if options.output:
         write_file(options.output, json.dumps(fit_to_json(fit), indent=2) + "\n")
-    _report(fit)
 
 
 def _show(progress: Progress) -> None:

@@ -37,6 +37,21 @@ def write_file(path: str | Path, text: str) -> None:
         ) from error
 
 
+def require_place(path: str | Path | None) -> None:
+    """Refuse a place that no file can be written to, before hours of work are done for it."""
+    if path is None:
+        return
+    folder = Path(path).parent
+    if not folder.is_dir():
+        raise OutputError(
+            f"{path}: there is no folder {folder}; make it or choose another with -o."
+        )
+    if Path(path).is_dir():
+        raise OutputError(f"{path}: this is a folder; name a file with -o.")
+    if not os.access(folder, os.W_OK):
+        raise OutputError(f"{path}: {folder} does not let you write; choose another with -o.")
+
+
 def make_folder(path: str | Path) -> Path:
     """The folder, made where it is missing."""
     path = Path(path)

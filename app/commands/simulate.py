@@ -8,7 +8,7 @@ from ...engine.measurement import read_run, run_to_csv
 from ...engine.road_file import read_road
 from ...engine.simulation import Simulation, simulate_posts, simulate_rims, simulate_road
 from .inputs import find_manoeuvre, find_vehicle
-from .output import print_fit_percent, print_warnings, write_file
+from .output import print_fit_percent, print_warnings, require_place, write_file
 
 BELONGS_TO = {"road": "--manoeuvre", "seed": "--manoeuvre", "traction": "--rims"}
 """Options that mean something in one mode only."""
@@ -24,12 +24,17 @@ def simulate(options: Namespace) -> None:
         raise SimulationError("--lift-off means nothing with --rims, where tyres play no part.")
     if not options.output and mode != "rims":
         raise SimulationError("Nothing says where the run goes; add -o run.csv.")
+    require_place(options.output)
     simulation = {"manoeuvre": _road, "rims": _rims, "posts": _posts}[mode](options)
     if simulation.fit_percent:
         print_fit_percent({simulation.run.name: simulation.fit_percent})
     if options.output:
         write_file(options.output, run_to_csv(simulation.run))
         print(f"Wrote {options.output}: {simulation.run.time.size} samples.")
+    shares = simulation.negative_load_share.items()
+    lost = [f"{corner} {100.0 * share:.1f} %" for corner, share in shares if share > 0.0]
+    if lost:
+        print(f"Share of the time with a tyre load at or below zero: {', '.join(lost)}.")
     print_warnings(simulation.warnings)
 
 

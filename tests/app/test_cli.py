@@ -259,6 +259,21 @@ def test_campaign_records_both_manoeuvres_with_the_noise_asked_for(folder, capsy
     assert read_vehicle("noisy/vehicle.json") == reference_vehicles()["paper"]
 
 
+@pytest.mark.parametrize("place", ["missing/fit.json", "."])
+def test_a_place_that_cannot_be_written_is_refused_before_the_work(folder, driven, capsys, place):
+    command = ["identify", str(driven), "--vehicle", "paper", "-o", place]
+    assert main(command) == 2
+    refused = capsys.readouterr()
+    assert place in refused.err
+    assert "-o" in refused.err
+    assert refused.out == ""
+
+
+def test_a_simulation_tells_when_a_tyre_pulls_on_the_road(folder, capsys):
+    assert main(["simulate", "--vehicle", "paper", "--manoeuvre", "bump", "-o", "run.csv"]) == 0
+    assert "tyre load at or below zero: fl" in capsys.readouterr().out
+
+
 PROGRAM = "import sys; from ridetune.app.cli import main; sys.exit(main())"
 
 
