@@ -31,8 +31,8 @@ class Outcome(StrEnum):
         "measure more."
     )
     DOUBTFUL = (
-        "The fit ended, but a channel probably has the wrong sign or unit; mend it as the warnings "
-        "say and fit again."
+        "The fit ended, but a channel is probably wrong (its sign, its unit or a dead sensor), so "
+        "nothing is determined; mend it as the warnings say and fit again."
     )
     ASTRAY = (
         "The fit ended further from the measurement than the measurement's own mean; check signs "
@@ -56,7 +56,7 @@ class ParameterEstimate:
 
     std_error, confidence_interval : infinite where the runs do not determine the parameter
     determined : "yes" (95 % half-width under 15 % of |value|), "weakly" (under 50 %) or "no"
-        (wider, or at a bound)
+        (wider, or at a bound, or when a channel is probably wrong)
     """
 
     name: str

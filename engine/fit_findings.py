@@ -90,10 +90,18 @@ def wrong_unit(run: str, channel: str, measured: Array, start: Array) -> str | N
     return None
 
 
+def dead_sensor(run: str, channel: str, measured: Array, model: Array, noise: float) -> str | None:
+    """A channel that never moves although the model at the start values does, beyond its noise."""
+    if np.ptp(measured) > 0.0 or float(np.std(model)) <= NOISE_EXPLAINS * noise:
+        return None
+    return (
+        f"{channel} of run {run} never moves while the model does; its sensor was probably dead: "
+        "leave the channel out."
+    )
+
+
 def poor_fit(run: str, channel: str, measured: Array, fitted: Array, noise: float) -> str | None:
     """A channel which the fitted model follows badly, for other reasons than its noise."""
-    if np.ptp(measured) == 0.0:
-        return f"{channel} of run {run} never moves; leave it out if its sensor was dead."
     percent = fit_percent(measured, fitted)
     misfit = float(np.sqrt(np.mean((measured - fitted) ** 2)))
     if percent >= POOR_FIT or misfit <= NOISE_EXPLAINS * noise:
@@ -107,7 +115,7 @@ def poor_fit(run: str, channel: str, measured: Array, fitted: Array, noise: floa
 def channel_faults(
     observations: Sequence[Observation], start: Histories, fitted: Histories
 ) -> dict[tuple[str, str], list[str]]:
-    """By run and channel, sentences on a sign or unit that is probably wrong."""
+    """By run and channel, sentences on a sign, unit or sensor that is probably wrong."""
     found: dict[tuple[str, str], list[str]] = {}
     for seen in observations:
         opposed = []
@@ -116,8 +124,9 @@ def channel_faults(
             sign = wrong_sign(seen.name, channel, measured, before, after)
             unit = wrong_unit(seen.name, channel, measured, before)
             opposed += [channel] if sign else []
-            if sign or unit:
-                found[seen.name, channel] = [one for one in (sign, unit) if one]
+            dead = dead_sensor(seen.name, channel, measured, before, seen.noise[channel])
+            if sign or unit or dead:
+                found[seen.name, channel] = [one for one in (sign, unit, dead) if one]
         if len(opposed) > 1:
             found[seen.name, opposed[-1]].append(
                 f"Since {' and '.join(opposed)} of run {seen.name} run against the model together, "

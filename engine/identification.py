@@ -8,6 +8,7 @@ tells what the paper's campaign can and cannot determine.
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -132,6 +133,8 @@ def identify(
     estimates = _estimates(problem, values, errors)
     fitted = residuals.model(solution.x)
     faults = channel_faults(problem.observations, start, fitted)
+    if faults:
+        estimates = tuple(replace(one, determined="no") for one in estimates)
     warnings = [
         *(warning for seen in problem.observations for warning in seen.inputs.warnings),
         *moved,

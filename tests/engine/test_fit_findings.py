@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from ridetune.engine.fit_findings import poor_fit, wrong_sign, wrong_unit
+from ridetune.engine.fit_findings import dead_sensor, poor_fit, wrong_sign, wrong_unit
 
 TIME = np.linspace(0.0, 20.0, 2001)
 BODY = 0.01 * np.sin(7.0 * TIME) + 0.003 * np.cos(3.0 * TIME)
@@ -66,5 +66,8 @@ def test_a_channel_buried_in_its_stated_noise_is_not_blamed():
 
 
 def test_a_dead_channel_is_named():
-    finding = poor_fit("lap", "chassis.roll", np.zeros_like(TIME), BODY, 5e-4)
-    assert "never moves" in finding
+    """A channel at rest is dead only where the model moves by more than the noise."""
+    still = np.zeros_like(TIME)
+    assert "never moves" in dead_sensor("lap", "chassis.roll", still, BODY, 5e-4)
+    assert dead_sensor("lap", "chassis.roll", still, 1e-3 * BODY, 5e-4) is None
+    assert dead_sensor("lap", "chassis.roll", BODY, BODY, 5e-4) is None

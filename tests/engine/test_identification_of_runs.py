@@ -176,6 +176,7 @@ def test_a_channel_of_the_wrong_sign_is_named_even_when_the_fit_goes_astray(deta
     assert run.name in named
     assert fit.outcome == Outcome.DOUBTFUL
     assert not fit.converged
+    assert {one.determined for one in fit.parameters} == {"no"}
 
 
 def test_wheels_of_the_wrong_sign_are_suspected(detailed):
