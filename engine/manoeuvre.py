@@ -8,6 +8,7 @@ The keys of each part are the fields of the record of that kind in `torque_laws`
 `post_sweep`; unknown ones are refused with the nearest known name.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -98,11 +99,14 @@ class Manoeuvre:
     def _place(self, vehicle: Vehicle, motion: PointMassMotion) -> Place:
         """Where the car is when the road matters."""
         off = None if self.drive is None else self.drive.end()
+        torque_end = None
+        if off is not None:
+            torque_end = motion.distance(off) if off <= self.duration else math.inf
         contact = vehicle.front.cg_distance
         farthest = float(motion.x.max()) * (1.0 + ROAD_MARGIN)
         return Place(
             first_contact=contact,
-            torque_end=None if off is None else motion.distance(off),
+            torque_end=torque_end,
             end=farthest + contact + 10.0,
         )
 

@@ -29,7 +29,8 @@ class Place:
     """Where a road lies relative to the car that drives on it, m along X.
 
     first_contact : front wheels' contact while the car stands at X = 0
-    torque_end : the car's X when the drive torque ends; None where it never does
+    torque_end : the car's X when the drive torque ends; None where there is none, infinite
+        where it acts beyond the manoeuvre's end
     end : beyond the farthest wheel at the end of the manoeuvre
     """
 

@@ -139,7 +139,7 @@ def simulate_rims(
     inputs = prepare(run, vehicle, settings)
     if model == "7dof":
         heights = np.column_stack([run[name] for name in WHEEL_CHANNELS])
-        result = baseline.simulate_rims(vehicle, run.time, heights, points)
+        result = replace(baseline.simulate_rims(vehicle, run.time, heights, points), name=run.name)
         loads = {}
     else:
         result = _rims_run(vehicle, inputs, traction, points)

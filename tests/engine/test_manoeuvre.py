@@ -127,6 +127,16 @@ def test_the_class_changes_where_the_car_is_when_the_torque_ends():
         assert_allclose(road.height(side, x), expected.height(side, x), rtol=0, atol=1e-6)
 
 
+@pytest.mark.parametrize("duration", [1.0, 7.0])
+def test_a_manoeuvre_cut_before_its_torque_ends_keeps_the_first_class(duration):
+    """Oracle: the whole manoeuvre's road, up to where its class changes."""
+    whole = reference_manoeuvres()["2"]
+    car = paper_vehicle()
+    cut = replace(whole, duration=duration).demand(car).road
+    x = np.linspace(0.0, cut.end - 1.0, 200)
+    assert_allclose(cut.height(LEFT, x), whole.demand(car).road.height(LEFT, x), atol=1e-6)
+
+
 def test_another_seed_is_another_road_and_the_same_torques():
     manoeuvre, vehicle = reference_manoeuvres()["1"], paper_vehicle()
     one, other = manoeuvre.demand(vehicle), replace(manoeuvre, seed=99).demand(vehicle)
