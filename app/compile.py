@@ -38,7 +38,7 @@ def steps() -> dict[str, Callable[[], object]]:
 def compile_all(tell: Callable[[str], None]) -> None:
     """Take every step, saying which before each."""
     for number, (what, step) in enumerate(steps().items(), start=1):
-        tell(f"Compiling {what} ({number} of {len(STEPS)}); the first start takes up to a minute.")
+        tell(f"Compiling {what} ({number} of {len(STEPS)}); the first start takes a minute or two.")
         step()
 
 

@@ -26,7 +26,7 @@ class WarmUp:
     def __init__(self, work: "Callable[[WarmUp], object]"):
         self._work = work
         self.state: State = "compiling"
-        self.message = "Compiling the simulation; the first start takes up to a minute."
+        self.message = "Compiling the simulation; the first start takes a minute or two."
         self._ended = threading.Event()
         self.closed = False
         self._apart: subprocess.Popen[str] | None = None
