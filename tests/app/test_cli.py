@@ -290,9 +290,11 @@ def test_interrupt_ends_quietly(folder):
     os.mkfifo("car.json")
     command = [sys.executable, "-c", PROGRAM, "identify", "run.csv", "--vehicle", "car.json"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as waiting:
-        with open("car.json", "w"):  # opens when the command does
+        # Opens when the command does. Closed again, since a signal just before the command's read
+        # would find it waiting for ever.
+        with open("car.json", "w"):
             waiting.send_signal(signal.SIGINT)
-            assert waiting.wait(timeout=60) == 130
+        assert waiting.wait(timeout=60) == 130
         assert waiting.stderr.read() == ""
 
 
