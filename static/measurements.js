@@ -5,6 +5,7 @@ import { $, breakable, h } from "./dom.js";
 import { notice } from "./notices.js";
 import { AXIS, fitWidth } from "./plots.js";
 import { choose } from "./ride.js";
+import { settled } from "./simulation.js";
 import { get, on, set } from "./store.js";
 import * as units from "./units.js";
 
@@ -122,7 +123,7 @@ function badges(row) {
   return out;
 }
 
-async function detail(row) {
+function detail(row) {
   plot?.destroy();
   plot = null;
   if (!row) {
@@ -134,7 +135,7 @@ async function detail(row) {
     names.map((name) => h("option", { value: name }, units.channel(name).label)));
   const drawing = h("div", { className: "preview" });
   const facts = h("p", { className: "hint" });
-  choice.addEventListener("change", () => preview(row, choice.value, drawing, facts));
+  choice.addEventListener("change", () => look(row, choice.value, drawing, facts));
   parts.detail.replaceChildren(
     h("div", { className: "row-tools" },
       h("strong", { className: "name" }, breakable(row.name)),
@@ -152,7 +153,13 @@ async function detail(row) {
     ...(row.usable_for_identification ? [] : [h("p", { className: "hint" },
       `It lacks ${row.missing.join(", ")}; identification needs them.`)]),
   );
-  if (names.length) await preview(row, choice.value, drawing, facts);
+  if (names.length) look(row, choice.value, drawing, facts);
+}
+
+/** The last preview asked for; a file is not deleted under its reader. */
+let looking = Promise.resolve();
+function look(...what) {
+  looking = preview(...what);
 }
 
 async function preview(row, name, drawing, facts) {
@@ -188,10 +195,14 @@ async function remove(row, event) {
     button.addEventListener("blur", () => { button.dataset.sure = ""; button.textContent = "Delete"; });
     return;
   }
+  // The page lets go of the file first: nothing may still be asking for it when it is deleted.
+  set({ measurements: get("measurements").filter(({ id }) => id !== row.id) });
+  await looking;
+  await settled();
   try {
     await api.deleteMeasurement(row.id);
-    set({ measurements: get("measurements").filter(({ id }) => id !== row.id) });
   } catch (error) {
+    set({ measurements: [...get("measurements"), row] });
     if (error.lost) set({ online: false });
     else notice("error", `${row.name} stays`, error.message);
   }

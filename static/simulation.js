@@ -19,6 +19,11 @@ export const timing = { asked: 0, shown: [] };
 /** Nothing is under way and nothing is wanted. */
 export const idle = () => !running;
 
+/** Resolves once no request is under way that began before the last change. */
+export async function settled() {
+  while (running) await new Promise((done) => setTimeout(done, 30));
+}
+
 /** Ask for runs: "now", "reference", "measured"; `scene` also sends the car's nodes. */
 export function want(...names) {
   if (names.includes("now") && !wanted.now) timing.asked = performance.now();
