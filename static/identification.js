@@ -23,7 +23,7 @@ export function build(callbacks) {
     hooks.open();
     if (!busy()) start();
   });
-  on("measurements values", () => {
+  on("measurements values ride", () => {
     const panel = $("#identification");
     if (view === "setup" && !panel.hidden && !panel.contains(document.activeElement)) show();
   });

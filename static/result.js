@@ -10,7 +10,6 @@ import * as units from "./units.js";
 const WELL = { yes: "well", weakly: "weakly", no: "not" };
 const STATES = {
   queued: "Waiting for a worker …",
-  running: "Fitting …",
   done: "Done",
   failed: "Failed",
   cancelled: "Cancelled",
@@ -60,6 +59,7 @@ function running(job) {
 }
 
 function outcome(job) {
+  if (job.state === "running") return `Fitting ${job.runs.map(({ name }) => name).join(", ")} …`;
   if (!job.result) return STATES[job.state];
   const { result } = job;
   return `${result.outcome} ${units.number(result.seconds, 2)} s, ${result.simulations} simulations.`;

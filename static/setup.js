@@ -8,12 +8,14 @@ const ROLES = { fit: "fit", holdout: "hold out", no: "leave out" };
 /** What is chosen: the role of each run, free parameters, bounds that differ from the default. */
 export const choice = { roles: {}, fixed: new Set(), bounds: {} };
 
-/** How a run is used: the first usable one is fitted, the others are held out. */
+/** How a run is used: unless chosen, the ride on show (or the first) is fitted, others held out. */
 function roleOf(run) {
   if (!run.usable_for_identification) return "no";
   if (choice.roles[run.id]) return choice.roles[run.id];
   const usable = get("measurements").filter((m) => m.usable_for_identification);
-  return usable[0] === run || usable.length === 1 ? "fit" : "holdout";
+  const { kind, id } = get("ride");
+  const shown = usable.find((m) => kind === "measurement" && m.id === id) ?? usable[0];
+  return run === shown ? "fit" : "holdout";
 }
 
 export const runsAs = (role) => get("measurements").filter((run) => roleOf(run) === role);
@@ -28,7 +30,8 @@ export function view(redraw) {
         ? h("table", { className: "runs" }, h("tbody", {}, runs.map(runRow)))
         : h("p", { className: "empty" }, "No measurement yet; add one under Measurements."),
       h("p", { className: "hint" },
-        "A run held out is not fitted: it shows how well the car predicts what it has not seen."),
+        "Unless you choose, the ride on show is fitted. A run held out is not: it shows how well " +
+        "the car predicts what it has not seen."),
       h("label", { className: "block" }, "Traction",
         select({ exact: "exact: the traction that gives the measured a_x",
           paper: "paper: total mass times a_x (biased)" }, get("traction"),

@@ -62,9 +62,11 @@ def test_an_uploaded_file_is_identified(visitor):
     visitor.until("ridetune.state('measurements').length === 3")
     assert "my_ride.csv" in visitor.element(".measurement-detail").inner_text()
 
+    visitor.page.get_by_role("button", name="Use as ride").click()
+
     visitor.click("#tab-identification")
-    for name, role in (("detailed_manoeuvre_1.csv", "no"), ("my_ride.csv", "fit")):
-        visitor.page.get_by_label(f"Use of {name}").select_option(role)
+    for name, role in (("detailed_manoeuvre_1.csv", "holdout"), ("my_ride.csv", "fit")):
+        assert visitor.page.get_by_label(f"Use of {name}").input_value() == role
     free_only(visitor, "KF", "CF", "KR", "CR")
     visitor.click("#start")
     visitor.until("ridetune.state('fit') !== null", 120)
