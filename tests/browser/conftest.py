@@ -205,13 +205,14 @@ def service(tmp_path_factory) -> Iterator[Service]:
 def visit(browser) -> Iterator[Callable[[], Visitor]]:
     """Makes visitors; each has cookies, and so a session, of its own.
 
-    Drawing in software is slow: the 3D view stays empty in stories that are not about it.
+    Drawing in software is slow: the 3D view is small, and empty in stories that are not about it.
     """
     contexts: list[BrowserContext] = []
     visitors: list[Visitor] = []
 
     def arrive(in_3d: bool = False) -> Visitor:
-        context = browser.new_context(viewport={"width": 1366, "height": 768})
+        size = (1120, 640) if in_3d else (1366, 768)
+        context = browser.new_context(viewport={"width": size[0], "height": size[1]})
         contexts.append(context)
         visitor = Visitor(context.new_page(), in_3d)
         if not in_3d:
