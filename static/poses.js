@@ -6,6 +6,7 @@
 
 const INBOARD = 0.19;
 const BAR_SHARE = 0.25;
+const SHADOW_LIFT = 0.012;
 export const CORNERS = ["fl", "fr", "rl", "rr"];
 /** Channels that a pose is made of. */
 export const POSE_CHANNELS = [
@@ -114,21 +115,26 @@ export function carMessages(vehicle, run, t, magnification) {
     messages.push(...pose(`/car/bar_${axle}`, right, across),
       update(`/car/bar_${axle}`, { scale: [1, length, 1] }));
   }
-  const [height, tilt] = ground(vehicle, run, where, magnification);
+  // On a rig the ground moves with the posts; the shadow lies on what the wheels stand on.
+  const [height, , tilt] = plane(vehicle, run, "post", where, magnification);
+  const [under, slope, lean] = plane(vehicle, run, "wheel", where, magnification);
+  const middle = (vehicle.front.cg_distance - vehicle.rear.cg_distance) / 2;
+  messages.push(...pose("/car/shadow", [middle, 0, under + slope * middle + SHADOW_LIFT], lean));
   messages.push(...pose("/road/surface", [-travelled, 0, height], tilt),
     ...pose("/road/lines", [-travelled, 0, height + 0.004], tilt));
   return messages;
 }
 
-/** On a rig the ground is the plane that the posts' heights make: height and turn. */
-function ground(vehicle, run, where, magnification) {
-  const [fl, fr, rl, rr] = CORNERS.map((c) => magnification * or0(valueAt(run, `post.${c}.z`, where)));
+/** The plane that four magnified heights make: height at X = 0, slope along X, and its turn. */
+function plane(vehicle, run, what, where, magnification) {
+  const [fl, fr, rl, rr] = CORNERS.map((c) =>
+    magnification * or0(valueAt(run, `${what}.${c}.z`, where)));
   const { front, rear } = vehicle;
-  const front_z = (fl + fr) / 2;
-  const rear_z = (rl + rr) / 2;
-  const slope = (front_z - rear_z) / (front.cg_distance + rear.cg_distance);
+  const frontHeight = (fl + fr) / 2;
+  const rearHeight = (rl + rr) / 2;
+  const slope = (frontHeight - rearHeight) / (front.cg_distance + rear.cg_distance);
   const bank = (fl - fr + rl - rr) / (front.track + rear.track);
-  return [rear_z + slope * rear.cg_distance,
+  return [rearHeight + slope * rear.cg_distance, slope,
     product(aboutY(-Math.atan(slope)), [Math.cos(bank / 2), Math.sin(bank / 2), 0, 0])];
 }
 
