@@ -167,8 +167,9 @@ def _point_mass(
             dense_output=True,
         )
         inside = (time >= begin) & (time <= end)
-        states[:2, inside] = solution.sol(time[inside])
-        states[2, inside] = np.vectorize(rate_of_speed)(time[inside], states[1, inside])
+        if inside.any():
+            states[:2, inside] = solution.sol(time[inside])
+            states[2, inside] = np.vectorize(rate_of_speed)(time[inside], states[1, inside])
         state = solution.y[:, -1]
     states.flags.writeable = False
     time.flags.writeable = False

@@ -122,3 +122,13 @@ def test_knots_that_differ_by_rounding_are_one():
     one = point_mass_motion(vehicle, torque, none, 5.0, np.nextafter(end, 2.0))
     other = point_mass_motion(vehicle, exact, none, 5.0, end)
     assert_allclose(one.x, other.x, rtol=1e-7)
+
+
+def test_knots_closer_than_the_motions_own_times_are_passed_over():
+    """Oracle: v = F t / M of a constant force, given by knots of 1 ms over 600 s."""
+    car = without_rolling_resistance(paper_vehicle())
+    knots = [0.0, 10.0, 10.001, 10.002, 600.0]
+    drive = on_rear(knots, np.full(5, 30.0))
+    motion = point_mass_motion(car, drive, PiecewiseLinear.zero(600.0), 0.0, 600.0)
+    expected = 2 * 30.0 / car.rear.wheel.radius / car.total_mass * motion.time
+    assert_allclose(motion.v, expected, rtol=1e-6, atol=1e-9)
