@@ -45,6 +45,12 @@ SHORTEST = 0.2
 
 FEWEST_SAMPLES = 10
 
+COARSEST = 0.1
+"""Mean time between samples up to which body motion of 1 to 3 Hz is seen at all, s."""
+
+LONGEST_GAP = 1.0
+"""A pause in a record beyond which nothing is known of the wheels, s."""
+
 BRAKING_CUTOFF = 1.0
 BRAKING_MARGIN = 0.5
 BRAKING_LASTS = 0.5
@@ -246,6 +252,18 @@ def _require(run: Run) -> None:
         raise MeasurementError(
             f"Run {run.name} has {len(run.time)} samples over {lasts:.3g} s; at least "
             f"{FEWEST_SAMPLES} samples over {SHORTEST} s are needed."
+        )
+    steps = np.diff(run.time)
+    if np.median(steps) > COARSEST:
+        raise MeasurementError(
+            f"Run {run.name} has a sample every {np.median(steps):.3g} s; at least one every "
+            f"{COARSEST} s is needed. Is its time in ms under a header that says s?"
+        )
+    widest = int(np.argmax(steps))
+    if steps[widest] > LONGEST_GAP:
+        raise MeasurementError(
+            f"Run {run.name} pauses between {run.time[widest]:.2f} and "
+            f"{run.time[widest + 1]:.2f} s; cut it there and give the parts as runs of their own."
         )
 
 

@@ -202,3 +202,15 @@ def test_sampling_too_coarse_for_the_filter_is_said_and_left_unfiltered():
 def test_settings_that_mean_nothing_are_refused(wrong):
     with pytest.raises(SimulationError):
         RimsSettings(**wrong)
+
+
+def test_milliseconds_read_as_seconds_are_refused_with_the_remedy():
+    with pytest.raises(MeasurementError, match="in ms under a header that says s"):
+        prepare(still_run(np.arange(0.0, 500.0, 5.0)), paper_vehicle())
+
+
+def test_a_pause_in_the_record_is_refused_with_its_place():
+    """A day's pause would otherwise be integrated in steps of 5 ms."""
+    time = np.concatenate([np.arange(0.0, 5.0, 0.01), 86400.0 + np.arange(0.0, 5.0, 0.01)])
+    with pytest.raises(MeasurementError, match=r"pauses between 4\.99 and 86400\.00 s"):
+        prepare(still_run(time), paper_vehicle())
