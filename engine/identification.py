@@ -30,6 +30,9 @@ __all__ = ["Fit", "FreeParameter", "Outcome", "Problem", "Progress", "identify"]
 
 Array = NDArray[np.float64]
 
+OFF_BOUNDS = 1e-3
+"""The search begins at least this share of the range away from a bound."""
+
 MOST_EVALUATIONS = 100
 EVALUATIONS_ON_A_FAULT = 40
 """Trial points spent when a channel probably has the wrong sign or unit: enough should it turn out
@@ -106,7 +109,13 @@ def identify(
     """
     began = time.perf_counter()
     residuals = Residuals(problem, simulate, cancelled)
-    x_start = np.array([one.variable(one.start) for one in problem.free])
+    # A start on a bound leaves the trust region no room and the search ends where it began.
+    room = OFF_BOUNDS * (residuals.upper - residuals.lower)
+    x_start = np.clip(
+        [one.variable(one.start) for one in problem.free],
+        residuals.lower + room,
+        residuals.upper - room,
+    )
     x_start, moved = _usable_start(residuals, x_start)
     start = residuals.model(x_start)
     at_start = channel_faults(problem.observations, start, start)

@@ -138,6 +138,16 @@ def test_two_parameters_with_one_effect_are_named_together():
     assert product == pytest.approx(24000.0 * 1700.0, rel=0.01)
 
 
+def test_a_start_on_a_bound_does_not_hold_the_search():
+    """Oracle: the truth, inside bounds one of which is the start."""
+    name = PARAMETER_NAMES[0]
+    low = 0.75 * CAR.value(name)
+    run = stand_in.recording(CAR, noise=0.0)
+    bounds = {name: (low, 2.0 * CAR.value(name))}
+    found = fit([run], start={name: low}, free=[name], bounds=bounds)
+    assert found.parameters[0].value == pytest.approx(CAR.value(name), rel=1e-6)
+
+
 def test_a_parameter_at_its_bound_is_reported():
     """Oracle: the truth lies beyond the upper bound."""
     name = PARAMETER_NAMES[2]
