@@ -286,9 +286,14 @@ def test_closed_pipe_ends_quietly(folder):
 
 
 def test_interrupt_ends_quietly(folder):
-    """The vehicle is a pipe that nobody writes to, so the command waits until interrupted."""
+    """The vehicle is a pipe that nobody writes to, so the command waits until interrupted.
+
+    Tests that run in the background of a shell ignore interrupts, and so would the command.
+    """
     os.mkfifo("car.json")
-    command = [sys.executable, "-c", PROGRAM, "identify", "run.csv", "--vehicle", "car.json"]
+    listening = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    program = [sys.executable, "-c", listening + PROGRAM]
+    command = [*program, "identify", "run.csv", "--vehicle", "car.json"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as waiting:
         # Opens when the command does. Closed again, since a signal just before the command's read
         # would find it waiting for ever.
