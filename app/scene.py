@@ -22,6 +22,7 @@ No skinned meshes: viser 1.1.1 fails when it has to take one down, as it does on
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 from viser import SceneApi
 
 from ..engine.frames import AXLES, CORNERS, AxleName, Corner, axle_of, side_of
@@ -43,6 +44,7 @@ GHOST = (86, 180, 233)
 ROAD = (52, 58, 66)
 MARKS = (150, 160, 172)
 SHADOW = (10, 12, 15)
+MARK = (240, 240, 240)
 
 ARM_MESH = shapes.tube((0, 0, 0), (1, 0, 0), 0.028)
 SPRING_MESH = shapes.coil((0, 0, 0.1), (0, 0, 1), 0.062, 0.009)
@@ -90,20 +92,9 @@ def _corner(scene: SceneApi, vehicle: Vehicle, corner: Corner) -> None:
     radius, side = axle.wheel.radius, side_of(corner)
     centre = wheel_centre(vehicle, corner)
     name = f"/car/wheel_{corner}"
-    vertices, faces = shapes.tyre(radius, TYRE_WIDTH)
-    scene.add_mesh_simple(
-        name, vertices, faces, color=TYRE, position=centre, side="double", cast_shadow=False
-    )
-    vertices, faces = shapes.rim(radius, 0.9 * TYRE_WIDTH)
-    scene.add_mesh_simple(
-        f"{name}/rim",
-        vertices * (1, side, 1),
-        faces,
-        color=RIM,
-        side="double",
-        flat_shading=True,
-        cast_shadow=False,
-    )
+    _part(scene, name, shapes.tyre(radius, TYRE_WIDTH), TYRE, centre)
+    vertices, faces = shapes.faceted(shapes.rim(radius, 0.9 * TYRE_WIDTH))
+    _part(scene, f"{name}/rim", (vertices * (1, side, 1), faces), RIM)
     hub = centre - (0, side * INBOARD, 0)
     hinge = pivot(vehicle, corner) - (0, side * INBOARD, 0)
     height = axle.suspension.mount_height
@@ -112,7 +103,7 @@ def _corner(scene: SceneApi, vehicle: Vehicle, corner: Corner) -> None:
         scene, f"/car/pivot_{corner}", shapes.tube((0, -0.07, 0), (0, 0.07, 0), 0.055), ARM, hinge
     )
     length, turn = _towards(hub - hinge)
-    _part(scene, f"/car/arm_{corner}", ARM_MESH, ARM, hinge, turn, (length, 1, 1))
+    _part(scene, f"/car/arm_{corner}", ARM_MESH, ARM, hinge, turn, scale=(length, 1, 1))
     _part(scene, f"/car/spring_{corner}", SPRING_MESH, SPRING, hub, scale=(1, 1, height))
     _part(
         scene,
@@ -130,7 +121,7 @@ def _corner(scene: SceneApi, vehicle: Vehicle, corner: Corner) -> None:
     )
     _part(scene, f"/car/rod_{corner}", rod, DAMPER, mount)
 
-    turn = np.linspace(0, 2 * np.pi, 33)
+    turn = np.linspace(0, 2 * np.pi, 25)
     circle = radius * np.column_stack([np.cos(turn), np.zeros_like(turn), np.sin(turn)])
     circle[:, 1] = side * TYRE_WIDTH / 2
     scene.add_line_segments(
@@ -180,18 +171,8 @@ def _body(scene: SceneApi, vehicle: Vehicle) -> None:
     sections = [section + offset for section in sections]
     at_rest = (0, 0, vehicle.chassis.cg_height)
 
-    vertices, faces = shapes.loft(sections, closed=False)
-    scene.add_mesh_simple(
-        "/car/body",
-        vertices,
-        faces,
-        color=BODY,
-        opacity=0.16,
-        side="double",
-        flat_shading=True,
-        cast_shadow=False,
-        position=at_rest,
-    )
+    shell = shapes.faceted(shapes.loft(sections, closed=False))
+    _part(scene, "/car/body", shell, BODY, at_rest, opacity=0.16)
     edges = _edges(sections)
     for name, colour, thickness in (
         ("/car/body/edges", EDGES, 1.4),
@@ -206,39 +187,19 @@ def _body(scene: SceneApi, vehicle: Vehicle) -> None:
             position=at_rest if name == "/ghost/body" else (0, 0, 0),
             visible=name != "/ghost/body",
         )
-    floor = shapes.moved(
-        shapes.box((0.86 * vehicle.wheelbase, 0.62 * width, 0.04)),
-        ((front.cg_distance - rear.cg_distance) / 2, 0, 0.30 - vehicle.chassis.cg_height),
-    )
-    scene.add_mesh_simple(
-        "/car/body/floor", *floor, color=DAMPER, opacity=0.55, flat_shading=True, cast_shadow=False
-    )
-    scene.add_icosphere(
-        "/car/body/cg", radius=0.045, color=(240, 240, 240), subdivisions=2, cast_shadow=False
-    )
-    shadow = shapes.box((1.5 * vehicle.wheelbase, 1.02 * width, 0.002))
     middle = (front.cg_distance - rear.cg_distance) / 2
-    scene.add_mesh_simple(
-        "/car/shadow",
-        *shadow,
-        color=SHADOW,
-        opacity=0.35,
-        position=(middle, 0, 0.004),
-        cast_shadow=False,
-    )
+    floor = shapes.faceted(shapes.box((0.86 * vehicle.wheelbase, 0.62 * width, 0.04)))
+    under = (middle, 0, 0.30 - vehicle.chassis.cg_height)
+    _part(scene, "/car/body/floor", floor, DAMPER, under, opacity=0.55)
+    _part(scene, "/car/body/cg", shapes.ball(0.045), MARK)
+    shadow = shapes.faceted(shapes.box((1.5 * vehicle.wheelbase, 1.02 * width, 0.002)))
+    _part(scene, "/car/shadow", shadow, SHADOW, (middle, 0, 0.004), opacity=0.35)
 
 
 def _road(scene: SceneApi) -> None:
     x, y = np.array([-30.0, 60.0]), np.array([1.7, -1.7])
     surface = [np.column_stack([np.full(2, station), y, np.zeros(2)]) for station in x]
-    scene.add_mesh_simple(
-        "/road/surface",
-        *shapes.loft(surface, closed=False),
-        color=ROAD,
-        side="double",
-        cast_shadow=False,
-        receive_shadow=False,
-    )
+    _part(scene, "/road/surface", shapes.loft(surface, closed=False), ROAD)
     marks = np.array([[(station, 1.7, 0), (station, -1.7, 0)] for station in range(-30, 61, 2)])
     scene.add_line_segments("/road/lines", marks, MARKS, thickness=1.2, thickness_units="screen")
 
@@ -251,7 +212,10 @@ def _edges(sections: list[np.ndarray]) -> np.ndarray:
     roof = cabin[[int(np.argmax(tops[cabin] > 0.9 * tops.max()))]]
     across = [0, cabin[0], int(roof[0]), cabin[-1], len(x) - 1]
     return np.concatenate(
-        [*(_polyline(line) for line in along), *(_polyline(sections[k]) for k in across)]
+        [
+            *(_polyline(shapes.straightened(line)) for line in along),
+            *(_polyline(sections[k]) for k in across),
+        ]
     )
 
 
@@ -271,17 +235,22 @@ def _part(
     name: str,
     mesh: shapes.Mesh,
     colour: tuple[int, int, int],
-    position: np.ndarray,
+    position: ArrayLike = (0.0, 0.0, 0.0),
     turn: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0),
+    *,
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    opacity: float | None = None,
 ) -> None:
+    """Every mesh has the same material: a browser without a GPU compiles each kind for seconds."""
     scene.add_mesh_simple(
         name,
         *mesh,
         color=colour,
+        opacity=opacity,
         side="double",
-        position=position,
+        position=np.asarray(position, dtype=float),
         wxyz=turn,
         scale=scale,
         cast_shadow=False,
+        receive_shadow=False,
     )

@@ -37,6 +37,26 @@ def moved(mesh: Mesh, offset: ArrayLike) -> Mesh:
     return vertices + np.asarray(offset, dtype=float), faces
 
 
+def faceted(mesh: Mesh) -> Mesh:
+    """The mesh with corners of its own for every triangle, so that edges look sharp."""
+    vertices, faces = mesh
+    return vertices[faces].reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3)
+
+
+def straightened(line: Vertices, tolerance: float = 1e-3) -> Vertices:
+    """A polyline without the points that lie on it anyway (m), by Ramer, Douglas and Peucker."""
+    start, end = line[0], line[-1]
+    along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-12)
+    off = line - start
+    distance = np.linalg.norm(off - np.outer(off @ along, along), axis=1)
+    far = int(np.argmax(distance))
+    if distance[far] <= tolerance:
+        return np.array([start, end])
+    return np.concatenate(
+        [straightened(line[: far + 1], tolerance)[:-1], straightened(line[far:], tolerance)]
+    )
+
+
 def loft(sections: Sequence[Vertices], closed: bool = True) -> Mesh:
     """Surface through sections of equal length; `closed` joins each section's end to its start."""
     count = len(sections[0])
@@ -86,6 +106,12 @@ def rim(radius: float, width: float) -> Mesh:
     return merge(ring, hub, *spokes)
 
 
+def ball(radius: float) -> Mesh:
+    """A sphere."""
+    angle = np.linspace(0, np.pi, 9)
+    return lathe([(radius * math.sin(a), -radius * math.cos(a)) for a in angle], 16)
+
+
 def turned(mesh: Mesh, angle: float) -> Mesh:
     """The mesh turned about the Y axis."""
     vertices, faces = mesh
@@ -127,7 +153,7 @@ def body_sections(wheelbase: float, width: float, wheel_radius: float) -> list[V
     arch = wheel_radius + ARCH_GAP
     knots = [x * wheelbase for x, _ in (*BELT, *ROOF)]
     arches = [
-        axle + arch * math.cos(a) for axle in (0.0, wheelbase) for a in np.linspace(0, math.pi, 19)
+        axle + arch * math.cos(a) for axle in (0.0, wheelbase) for a in np.linspace(0, math.pi, 13)
     ]
     lowest = GROUND_CLEARANCE * wheel_radius / 0.3
     sections = []

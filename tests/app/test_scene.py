@@ -101,6 +101,8 @@ def test_grips_sit_at_the_pivots(nodes, vehicle, axle, corner):
         shapes.tube((0, 0, 0), (1, 0, 0), 0.1),
         shapes.tyre(0.3, 0.2),
         shapes.rim(0.3, 0.2),
+        shapes.ball(0.1),
+        shapes.faceted(shapes.box((1.0, 2.0, 3.0))),
         shapes.coil((0, 0, 0), (0, 0, 1), 0.1, 0.01),
     ],
 )
@@ -108,6 +110,16 @@ def test_meshes_refer_to_their_own_vertices_and_all_of_them(mesh):
     vertices, faces = mesh
     assert np.isfinite(vertices).all()
     assert set(np.unique(faces)) == set(range(len(vertices)))
+
+
+def test_straightening_keeps_the_line_within_its_tolerance():
+    """Every point of the original stays within 1 mm of the straightened line."""
+    x = np.linspace(0, 3, 200)
+    line = np.column_stack([x, np.zeros_like(x), np.where(x < 1, 0, np.sin(x - 1) ** 2)])
+    kept = shapes.straightened(line)
+    assert len(kept) < 60
+    assert_allclose(np.interp(x, kept[:, 0], kept[:, 2]), line[:, 2], atol=1.5e-3)
+    assert_allclose(shapes.straightened(line[:60]), line[[0, 59]])
 
 
 def test_a_box_has_its_volume():
