@@ -56,7 +56,7 @@ class ParameterEstimate:
 
     std_error, confidence_interval : infinite where the runs do not determine the parameter
     determined : "yes" (95 % half-width under 15 % of |value|), "weakly" (under 50 %) or "no"
-        (wider, or at a bound, or when a channel is probably wrong)
+        (wider, or at a bound, or when the fit did not converge to the runs)
     """
 
     name: str

@@ -142,7 +142,9 @@ def identify(
     estimates = _estimates(problem, values, errors)
     fitted = residuals.model(solution.x)
     faults = channel_faults(problem.observations, start, fitted)
-    if faults:
+    outcome = Outcome.DOUBTFUL if faults else _outcome(solution.status, estimates, search)
+    converged = outcome in CONVERGED
+    if not converged:
         estimates = tuple(replace(one, determined="no") for one in estimates)
     warnings = [
         *(warning for seen in problem.observations for warning in seen.inputs.warnings),
@@ -150,9 +152,8 @@ def identify(
         *(sentence for sentences in faults.values() for sentence in sentences),
         *poor_fits(problem.observations, fitted, faults),
         *bound_findings(estimates),
-        *(undetermined_findings(estimates, errors) if not faults else []),
+        *(undetermined_findings(estimates, errors) if converged else []),
     ]
-    outcome = Outcome.DOUBTFUL if faults else _outcome(solution.status, estimates, search)
     return Fit(
         vehicle=problem.vehicle_at(solution.x),
         parameters=estimates,
@@ -161,7 +162,7 @@ def identify(
         fit_percent=_percents(residuals, r),
         residuals=_histories(residuals, r),
         outcome=outcome,
-        converged=outcome in CONVERGED,
+        converged=converged,
         warnings=tuple(dict.fromkeys(warnings)),
         seconds=time.perf_counter() - began,
         simulations=residuals.simulations,
@@ -187,7 +188,7 @@ def _usable_start(residuals: Residuals, x: Array) -> tuple[Array, list[str]]:
     """
     r = residuals.vector(x)
     failed = bool(np.any(r == FAILED_TRIAL))
-    if r @ r < residuals.scatter():
+    if r @ r <= residuals.scatter():
         return x, []
     if not failed:
         start = residuals.model(x)

@@ -28,6 +28,9 @@ DEFAULT_NOISE = {
 }
 """Standard deviation of a channel's noise where neither the run nor the caller states one."""
 
+MOVES = 2.0
+"""A channel moves when its standard deviation is more than this many times that of its noise."""
+
 
 @dataclass(frozen=True, slots=True)
 class FreeParameter:
@@ -130,6 +133,8 @@ class Problem:
                 f"{samples} samples cannot determine {len(parameters)} parameters; free fewer "
                 "or measure longer."
             )
+        if not any(map(_moves, observations)):
+            raise ProblemError(_at_rest(observations))
         return cls(vehicle, observations, parameters, traction, settings)
 
     def values(self, x: Array) -> Array:
@@ -249,6 +254,24 @@ def _observations(
             )
         )
     return tuple(found)
+
+
+def _moves(seen: Observation) -> bool:
+    return any(
+        float(np.std(values)) > MOVES * seen.noise[channel]
+        for channel, values in seen.measured.items()
+    )
+
+
+def _at_rest(observations: Sequence[Observation]) -> str:
+    names = [seen.name for seen in observations]
+    runs = f"run {names[0]}" if len(names) == 1 else f"runs {', '.join(names)}"
+    channels = dict.fromkeys(name for seen in observations for name in seen.measured)
+    return (
+        f"Nothing can be learnt from {runs}: {', '.join(channels)} "
+        f"{'stays within its' if len(channels) == 1 else 'stay within their'} noise; give a run "
+        "in which the car moves, or state the noise if it is smaller."
+    )
 
 
 def _distinct_names(runs: Sequence[Run]) -> list[str]:

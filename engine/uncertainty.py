@@ -22,8 +22,8 @@ count for fewer samples, N_b = N / sum w_k^2 (g_k/g_0)^2 over all lags of both s
 multiplied by N_eff / (N_eff - n): for white residuals chi-square over its degrees of freedom.
 
 Directions which the runs do not move at all are found in the singular value decomposition of J with
-columns scaled by the parameters' scales: s_i <= DIRECTION_TOLERANCE s_max. A parameter with a
-part in such a direction has an infinite standard error.
+columns scaled by the parameters' scales: s_i <= DIRECTION_TOLERANCE s_max, or s_i <=
+LEAST_EFFECT. A parameter with a part in such a direction has an infinite standard error.
 """
 
 from collections.abc import Sequence
@@ -38,6 +38,10 @@ Array = NDArray[np.float64]
 DIRECTION_TOLERANCE = 1e-7
 """Relative singular value below which a direction is undetermined; above the error, about 1e-9,
 of the differences that make J."""
+
+LEAST_EFFECT = 1e-3
+"""Change of |r| by a change of all of its scale, from which a direction has any effect on the runs:
+a thousandth of one sample's noise, over the whole campaign."""
 
 PART_OF_DIRECTION = 1e-3
 """Component of a unit direction from which a parameter counts as part of it."""
@@ -70,7 +74,7 @@ def uncertainty(blocks: Sequence[tuple[Array, Array]], scale: Array) -> Uncertai
     n = len(scale)
     jacobian = np.concatenate([block_jacobian for _, block_jacobian in blocks]) * scale
     _, singular, directions = np.linalg.svd(np.linalg.qr(jacobian, mode="r"))
-    known = singular > DIRECTION_TOLERANCE * singular[0]
+    known = singular > max(DIRECTION_TOLERANCE * singular[0], LEAST_EFFECT)
     undetermined = np.any(np.abs(directions[~known]) > PART_OF_DIRECTION, axis=0)
     inverse_root = directions[known].T / singular[known]
     bread = inverse_root @ inverse_root.T

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ridetune.engine.campaign import drive_campaign
+from ridetune.engine.channels import Run
 from ridetune.engine.fit import Outcome
 from ridetune.engine.identification import Problem, identify
 from ridetune.engine.measurement import read_run
@@ -122,6 +123,18 @@ def test_noisy_outputs_leave_springs_and_dampers_determined():
     bars = [one.name for one in fit.parameters].index("front.stabilizer_bar.stiffness")
     pivot = [one.name for one in fit.parameters].index("front.pivot.distance")
     assert fit.correlation[bars, pivot] > 0.99
+
+
+def test_a_standing_car_determines_nothing():
+    """Sensor noise alone, stated too small: the fit finds what follows it least badly."""
+    rng = np.random.default_rng(5)
+    time = 0.005 * np.arange(2001)
+    sizes = {**dict.fromkeys(WHEEL_CHANNELS, 5e-4), "chassis.a_x": 0.05, **DEFAULT_NOISE}
+    channels = {name: size * rng.normal(size=len(time)) for name, size in sizes.items()}
+    noise = {name: 0.1 * size for name, size in DEFAULT_NOISE.items()}
+    fit = identify(Problem.build(CAR, [Run("parked", time, channels)], noise=noise))
+    assert not fit.converged
+    assert {one.determined for one in fit.parameters} == {"no"}
 
 
 def test_a_symmetric_run_does_not_excite_the_bars(campaign):

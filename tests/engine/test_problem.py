@@ -128,6 +128,18 @@ def test_fewer_samples_than_parameters_are_refused():
     assert "10 samples cannot determine 12" in refused(CAR, [Run("short", time, channels)])
 
 
+def test_a_standing_car_is_refused_unless_its_noise_is_smaller():
+    """Nothing moves beyond the noise, whether the channels are clean or not."""
+    rng = np.random.default_rng(1)
+    time = 0.005 * np.arange(1001)
+    still = dict.fromkeys(INPUT_CHANNELS, np.zeros_like(time))
+    for size in (0.0, 1.0):
+        noise = {name: size * DEFAULT_NOISE[name] * rng.normal(size=1001) for name in DEFAULT_NOISE}
+        run = Run("parked", time, {**still, **noise})
+        assert "run parked: chassis.z, chassis.pitch, chassis.roll stay" in refused(CAR, [run])
+    assert Problem.build(CAR, [run], noise={"chassis.z": 0.1 * DEFAULT_NOISE["chassis.z"]})
+
+
 @pytest.mark.parametrize(
     ("parameter", "logarithmic"),
     [

@@ -114,6 +114,15 @@ def test_a_parameter_without_effect_is_infinite():
     assert np.isinf(found.alone[1])
 
 
+def test_an_effect_far_below_the_noise_is_none():
+    """Oracle: the standard error of a column of length 1e-4 is 1e4 times its scale. Rounding
+    alone gives such columns, and residuals of the same size would make them look well known."""
+    faint = 1e-4 * slow_regressors(100) / np.sqrt(100)
+    found = uncertainty([(faint[:, 0], faint)], SCALE)
+    assert np.all(np.isinf(found.half_width))
+    assert np.all(np.isnan(found.correlation[~np.eye(3, dtype=bool)]))
+
+
 def test_a_perfect_fit_has_no_error():
     jacobian = slow_regressors(100)
     found = uncertainty([(np.zeros(100), jacobian)], SCALE)
