@@ -13,7 +13,7 @@ STEPS = ("the car on the road", "the car on the rig", "the car on its rims")
 def steps() -> dict[str, Callable[[], object]]:
     """One short call of every mode, by name; compiles, or loads what has been compiled."""
     from ..engine.manoeuvre import reference_manoeuvres
-    from ..engine.rims import RimsSettings, prepare
+    from ..engine.rims import prepare
     from ..engine.simulation import rims_batch, simulate_posts, simulate_rims, simulate_road
     from ..engine.vehicle_file import reference_vehicles
 
@@ -25,7 +25,7 @@ def steps() -> dict[str, Callable[[], object]]:
         driven = simulate_road(car, rolling).run
         simulate_rims(car, driven, traction="exact")
         simulate_rims(car, driven, traction="paper")
-        rims_batch([car, car], prepare(driven, car, RimsSettings()), "exact")
+        rims_batch([car, car], prepare(driven, car), "exact")
 
     road, rig, rims = STEPS
     return {

@@ -62,11 +62,9 @@ def parse(data: bytes, name: str) -> Run:
 
 def summary(run: Run) -> dict[str, Any]:
     """What a person wants to know of a recording before using it."""
-    from ..engine.measurement import INPUTS_FOR_IDENTIFICATION, OUTPUTS_FOR_IDENTIFICATION
+    from ..engine.measurement import missing_for_identification
 
-    missing = [name for name in INPUTS_FOR_IDENTIFICATION if name not in run]
-    if not any(name in run for name in OUTPUTS_FOR_IDENTIFICATION):
-        missing.append(" or ".join(OUTPUTS_FOR_IDENTIFICATION))
+    missing = list(missing_for_identification(run))
     return {
         "samples": len(run.time),
         "duration": run.duration,

@@ -57,6 +57,13 @@ def _row(
     return ChannelInfo(name, unit, quantity, label, sign, shown, factor, largest, smallest)
 
 
+WHEEL_CHANNELS = tuple(f"wheel.{corner}.z" for corner in CORNERS)
+INPUT_CHANNELS = (*WHEEL_CHANNELS, "chassis.a_x")
+"""What drives the model in the rims mode."""
+
+OUTPUT_CHANNELS = ("chassis.z", "chassis.pitch", "chassis.roll")
+"""What the model is compared with there; a recording needs at least one."""
+
 CHANNEL_KINDS: tuple[ChannelInfo, ...] = (
     _row("time", "s", "time", "Time", "strictly increasing"),
     _row(
@@ -298,6 +305,7 @@ class Run:
     channels : name -> (n,) in the channel's SI unit
     noise : name -> standard deviation of the measurement noise in SI, where it is known
     warnings : sentences about what is doubtful in the recording
+    braking : (begin, end) in s where the car brakes; None to look for it in a_x
     """
 
     name: str
@@ -306,6 +314,7 @@ class Run:
     noise: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     description: str = ""
+    braking: tuple[tuple[float, float], ...] | None = None
 
     def __post_init__(self) -> None:
         """Check the shapes and bring the channels into the table's order."""

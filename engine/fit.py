@@ -7,7 +7,8 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from .rims import RimsSettings
+from .braking import Interval
+from .rims_settings import RimsSettings
 from .vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -73,11 +74,16 @@ class ParameterEstimate:
 
 @dataclass(frozen=True, slots=True)
 class FittedRun:
-    """What was compared in one run: number of samples and the noise assumed a channel, SI."""
+    """What was compared in one run, SI.
+
+    noise : assumed, by channel
+    braking : (begin, end) where the car was taken to brake, s
+    """
 
     name: str
     samples: int
     noise: Mapping[str, float]
+    braking: tuple[Interval, ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,7 +28,12 @@ def fit_to_json(fit: Fit) -> dict[str, Any]:
             "cost_history": list(fit.cost_history),
             "fit_percent": {run: dict(channels) for run, channels in fit.fit_percent.items()},
             "runs": [
-                {"name": run.name, "samples": run.samples, "noise": dict(run.noise)}
+                {
+                    "name": run.name,
+                    "samples": run.samples,
+                    "noise": dict(run.noise),
+                    "braking": [list(interval) for interval in run.braking],
+                }
                 for run in fit.runs
             ],
             "traction": fit.traction,

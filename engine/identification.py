@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats.qmc import Halton
 
+from .channels import WHEEL_CHANNELS
 from .errors import ProblemError
 from .fit import CONVERGED, Fit, FittedRun, Outcome, ParameterEstimate, Progress, determined
 from .fit_findings import bound_findings, channel_faults, poor_fits, undetermined_findings
 from .parameters import parameter
 from .problem import FreeParameter, Problem
 from .residuals import FAILED_TRIAL, Residuals, Simulate
-from .rims import WHEEL_CHANNELS
 from .simulation import fit_percent, rims_batch
 from .uncertainty import Uncertainty, uncertainty
 
@@ -171,7 +171,7 @@ def identify(
         traction=problem.traction,
         settings=problem.settings,
         runs=tuple(
-            FittedRun(seen.name, len(seen.inputs.time), dict(seen.noise))
+            FittedRun(seen.name, len(seen.inputs.time), dict(seen.noise), seen.inputs.braking)
             for seen in problem.observations
         ),
     )

@@ -16,10 +16,17 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from .channels import CHANNELS, ChannelInfo, Run, channel, find_channel
+from .channels import (
+    CHANNELS,
+    INPUT_CHANNELS,
+    OUTPUT_CHANNELS,
+    ChannelInfo,
+    Run,
+    channel,
+    find_channel,
+)
 from .csv_table import LARGEST_FILE, CsvTable, is_number, split_title
 from .errors import MeasurementError
-from .frames import CORNERS
 from .run_notes import RunNotes, checked_noise, read_notes
 from .units import UnitError, to_si
 
@@ -28,12 +35,6 @@ FEWEST_SAMPLES = 10
 
 COARSEST_STEP = 0.2
 """Time between samples, s, from which on the unit of time is doubtful."""
-
-INPUTS_FOR_IDENTIFICATION = (*(f"wheel.{corner}.z" for corner in CORNERS), "chassis.a_x")
-"""Channels that drive the model in an identification."""
-
-OUTPUTS_FOR_IDENTIFICATION = ("chassis.z", "chassis.pitch", "chassis.roll")
-"""Channels the model is compared with; a run needs at least one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,20 +85,10 @@ def run_to_csv(run: Run) -> str:
 
 def missing_for_identification(run: Run) -> tuple[str, ...]:
     """What a run lacks to identify a car from it; the last entry may name alternatives."""
-    missing = [name for name in INPUTS_FOR_IDENTIFICATION if name not in run]
-    if not any(name in run for name in OUTPUTS_FOR_IDENTIFICATION):
-        missing.append(" or ".join(OUTPUTS_FOR_IDENTIFICATION))
+    missing = [name for name in INPUT_CHANNELS if name not in run]
+    if not any(name in run for name in OUTPUT_CHANNELS):
+        missing.append(" or ".join(OUTPUT_CHANNELS))
     return tuple(missing)
-
-
-def require_for_identification(run: Run) -> None:
-    """Refuse a run from which no car can be identified."""
-    missing = missing_for_identification(run)
-    if missing:
-        raise MeasurementError(
-            f"{run.name}: an identification also needs {', '.join(missing)}; add"
-            f" {'this column' if len(missing) == 1 else 'these columns'} to the recording."
-        )
 
 
 def _run(stream: BinaryIO, source: str, noise: Mapping[str, float], description: str) -> Run:

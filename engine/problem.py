@@ -12,10 +12,11 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from .channels import Run
+from .channels import OUTPUT_CHANNELS, Run
 from .errors import ProblemError, VehicleError
 from .parameters import PARAMETER_NAMES, default_bounds, parameter
-from .rims import OUTPUT_CHANNELS, RimsInputs, RimsSettings, filtered_outputs, prepare
+from .rims import RimsInputs, filtered_outputs, prepare
+from .rims_settings import RimsSettings
 from .simulation import Traction
 from .vehicle import Vehicle
 

@@ -26,10 +26,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .channels import OUTPUT_CHANNELS
 from .errors import Cancelled
 from .filters import smoothed
 from .problem import Problem
-from .rims import OUTPUT_CHANNELS, RimsInputs
+from .rims import RimsInputs
 from .simulation import Traction
 from .vehicle import Vehicle
 

@@ -4,13 +4,13 @@ The four wheel centres' vertical displacement u_i(t) and the chassis's accelerat
 prescribed. The integrator needs u, u', u'', a_x, the speed v_x and the braking weight b at the
 begin, middle and end of each of its steps; this module makes them, in this order:
 
-1. Wheel channels, zero-phase low-pass at `rim_cutoff_hz` (off by default), then one C2 cubic
-   spline per channel through the samples; u' and u'' are its derivatives.
+1. Wheel channels, zero-phase low-pass at `rim_cutoff_hz` (50 Hz by default), then one C2 cubic
+   spline per channel through the samples; u' and u'' are its derivatives. Without the filter the
+   noise of a record at 1 kHz (0.5 mm) would be accelerations of 1000 m/s2.
 2. a_x, zero-phase low-pass at `a_x_cutoff_hz` (20 Hz by default), then a C2 cubic spline.
-3. v_x from the file's `chassis.v_x`, else the integral of a_x from zero.
-4. b(t): 1 where a_x, low-passed zero-phase at 1 Hz, stays below -(fr g + 0.5 m/s2) for at least
-   0.5 s, or where `braking_intervals` says so; 0 elsewhere, with linear ramps of 0.1 s outside each
-   interval. 0 throughout when the vehicle has no brakes.
+3. v_x from the file's `chassis.v_x`, else the integral of a_x, raised by as much as it takes to
+   stay above zero: only the sense of rolling resistance depends on it.
+4. The braking weight b(t) of `braking`.
 
 The filter is `filters.low_pass`. Nodes are uniform over the record, their step the longest that
 divides it and does not exceed `step`. Where the samples do not fall on nodes, the model's output
@@ -18,27 +18,22 @@ is carried to them by cubic Hermite interpolation from its states and rates.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, PPoly
 
-from .channels import Run
-from .equilibrium import static_loads
-from .errors import MeasurementError, SimulationError, VehicleError
-from .filters import is_uniform, low_pass, smoothed, too_coarse
-from .frames import CORNERS, GRAVITY
+from .braking import Interval, braking_of, braking_weight
+from .channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
+from .demand import rolling_resistance
+from .errors import MeasurementError
+from .filters import is_uniform, smoothed, too_coarse
 from .recording_checks import check_recording
+from .rims_settings import RimsSettings
 from .vehicle import Vehicle
 
 Array = NDArray[np.float64]
-
-WHEEL_CHANNELS = tuple(f"wheel.{corner}.z" for corner in CORNERS)
-INPUT_CHANNELS = (*WHEEL_CHANNELS, "chassis.a_x")
-OUTPUT_CHANNELS = ("chassis.z", "chassis.pitch", "chassis.roll")
-"""What the rims mode returns, in the order of its last axis."""
 
 SHORTEST = 0.2
 """A record must last this long, s: the reflected ends of the 20 Hz filter need it."""
@@ -51,48 +46,15 @@ COARSEST = 0.1
 LONGEST_GAP = 1.0
 """A pause in a record beyond which nothing is known of the wheels, s."""
 
-BRAKING_CUTOFF = 1.0
-BRAKING_MARGIN = 0.5
-BRAKING_LASTS = 0.5
-BRAKING_RAMP = 0.1
 START_WINDOW = 0.2
+"""The start of a record from which its initial state is taken, s."""
 
+AT_REST = {"chassis.z": 0.02, "chassis.pitch": math.radians(1.0), "chassis.roll": math.radians(1.0)}
+"""Rates with which a car may start for equilibrium to be a good initial state, SI; a body that
+bounces at 1.2 Hz through 3 mm exceeds the first."""
 
-@dataclass(frozen=True, slots=True)
-class RimsSettings:
-    """How a recording is prepared; carried into every result.
-
-    a_x_cutoff_hz, rim_cutoff_hz : zero-phase low-pass of a_x and of the wheels; None for none
-    output_cutoff_hz : low-pass of z, pitch and roll, applied to the model and to the measurement
-    start : "equilibrium" (static under the first wheel displacements, at rest) or "measured"
-    braking_intervals : (begin, end) in s where the car brakes; None to find them in a_x
-    step : longest integration step, s
-    """
-
-    a_x_cutoff_hz: float | None = 20.0
-    rim_cutoff_hz: float | None = None
-    output_cutoff_hz: float | None = None
-    start: str = "equilibrium"
-    braking_intervals: tuple[tuple[float, float], ...] | None = None
-    step: float = 0.005
-
-    def __post_init__(self) -> None:
-        """Refuse settings that mean nothing."""
-        for name in ("a_x_cutoff_hz", "rim_cutoff_hz", "output_cutoff_hz"):
-            cutoff = getattr(self, name)
-            if cutoff is not None and not 0.0 < cutoff < math.inf:
-                raise SimulationError(f"{name} is {cutoff}; give a positive frequency or none.")
-        if self.start not in ("equilibrium", "measured"):
-            raise SimulationError(
-                f'start is "{self.start}"; it can be "equilibrium" or "measured".'
-            )
-        if not 0.0 < self.step <= 0.02:
-            raise SimulationError(f"step is {self.step} s; give a step of at most 0.02 s.")
-        for begin, end in self.braking_intervals or ():
-            if not begin < end:
-                raise SimulationError(
-                    f"Braking from {begin} s to {end} s: the end must come after the begin."
-                )
+FAST = 1.0
+"""Speed that a_x must have taken away for a start in motion to be told of, m/s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +70,7 @@ class RimsInputs:
     sample_step : (samples,) the step in which each sample lies
     sample_fraction : (samples,) where in that step, 0 to 1
     on_nodes : whether every sample coincides with a node
+    braking : (begin, end) where the car is taken to brake, s
     warnings : sentences about the recording
     """
 
@@ -119,6 +82,7 @@ class RimsInputs:
     sample_step: NDArray[np.int64]
     sample_fraction: Array
     on_nodes: bool
+    braking: tuple[Interval, ...] = ()
     warnings: tuple[str, ...] = ()
 
     @property
@@ -148,8 +112,8 @@ def prepare(run: Run, vehicle: Vehicle, settings: RimsSettings | None = None) ->
     """Inputs of the rims mode for one run.
 
     The vehicle matters only for the braking weight (its brakes and rolling resistance).
-    Raises MeasurementError when a channel is missing or the run is too short, VehicleError when
-    braking is marked for a vehicle without brakes.
+    Raises MeasurementError when a channel is missing, the run is too short or braking is marked
+    outside it, VehicleError when braking is marked for a vehicle without brakes.
     """
     settings = settings or RimsSettings()
     _require(run)
@@ -161,29 +125,17 @@ def prepare(run: Run, vehicle: Vehicle, settings: RimsSettings | None = None) ->
     wheels = CubicSpline(time, smoothed(time, wheel_z, settings.rim_cutoff_hz))
     a_x = smoothed(time, run["chassis.a_x"], settings.a_x_cutoff_hz)
     acceleration = CubicSpline(time, a_x)
-    speed = (
-        CubicSpline(time, run["chassis.v_x"])
-        if "chassis.v_x" in run
-        else acceleration.antiderivative()
-    )
-    intervals = find_braking(time, a_x, _rolling_share(vehicle))
-    warnings = [*run.warnings, *_sampling_warnings(run, settings), *check_recording(run)]
-    if vehicle.brakes is None:
-        if settings.braking_intervals:
-            raise VehicleError(
-                f"Braking is marked in run {run.name}, but the vehicle has no brakes; add "
-                '"brakes": {"front_share": 0.65} with its own share to the vehicle.'
-            )
-        if intervals:
-            begin, end = intervals[0]
-            warnings.append(
-                f"Run {run.name} brakes from {begin:.1f} to {end:.1f} s, but the vehicle has no "
-                "brakes, so the force is taken to act on the driven wheels; add "
-                '"brakes": {"front_share": ...} to the vehicle.'
-            )
-        intervals = []
-    elif settings.braking_intervals is not None:
-        intervals = list(settings.braking_intervals)
+    speed, unknown_start = _speed(run, acceleration)
+    intervals, unbraked = braking_of(run, a_x, vehicle, rolling_resistance(vehicle))
+    measured = settings.initial_state == "measured"
+    warnings = [
+        *run.warnings,
+        *_sampling_warnings(run, settings),
+        *check_recording(run),
+        *unknown_start,
+        *unbraked,
+        *([] if measured else _moving_start(run)),
+    ]
 
     columns = np.column_stack(
         [
@@ -201,33 +153,13 @@ def prepare(run: Run, vehicle: Vehicle, settings: RimsSettings | None = None) ->
         time=time,
         node_time=nodes,
         stage_inputs=np.stack([columns[:-2:2], columns[1::2], columns[2::2]], axis=1),
-        start_state=_measured_start(run) if settings.start == "measured" else None,
+        start_state=_measured_start(run) if measured else None,
         sample_step=step,
         sample_fraction=fraction,
         on_nodes=bool(np.all(np.minimum(fraction, 1.0 - fraction) < 1e-6)),
+        braking=tuple(intervals),
         warnings=tuple(warnings),
     )
-
-
-def find_braking(time: Array, a_x: Array, rolling_share: float) -> list[tuple[float, float]]:
-    """Intervals (begin, end), s, where the car brakes; step 4 of the module's list.
-
-    rolling_share : rolling resistance coefficient fr of the whole car
-    """
-    level = -(rolling_share * GRAVITY + BRAKING_MARGIN)
-    below = low_pass(time, a_x, BRAKING_CUTOFF) < level
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], below, [False]]).astype(int)))
-    spans = [(time[first], time[last - 1]) for first, last in edges.reshape(-1, 2)]
-    return [(float(begin), float(end)) for begin, end in spans if end - begin >= BRAKING_LASTS]
-
-
-def braking_weight(time: Array, intervals: Sequence[tuple[float, float]]) -> Array:
-    """b(t): 1 inside each (begin, end), 0 outside, linear over 0.1 s just outside its ends."""
-    weight = np.zeros_like(time)
-    for begin, end in intervals:
-        inside = 1.0 + np.minimum(time - begin, end - time) / BRAKING_RAMP
-        weight = np.maximum(weight, np.clip(inside, 0.0, 1.0))
-    return weight
 
 
 def filtered_outputs(run: Run, cutoff: float | None) -> dict[str, Array]:
@@ -284,11 +216,27 @@ def _locate(time: Array, nodes: Array) -> tuple[NDArray[np.int64], Array]:
     return step, np.clip(position - step, 0.0, 1.0)
 
 
+def _speed(run: Run, acceleration: CubicSpline) -> tuple[PPoly, list[str]]:
+    """v_x as a function of time, m/s, and a warning where it is a guess."""
+    if "chassis.v_x" in run:
+        return CubicSpline(run.time, run["chassis.v_x"]), []
+    gained = acceleration.antiderivative()
+    lost = max(0.0, -float(gained(run.time).min()))
+    gained.c[-1] += lost
+    if lost < FAST:
+        return gained, []
+    return gained, [
+        f"Run {run.name} has no chassis.v_x, and by its chassis.a_x it slows down by "
+        f"{lost:.1f} m/s from its start; it is taken to start with that speed, which only the "
+        "sense of rolling resistance depends on. Add chassis.v_x if you have it."
+    ]
+
+
 def _sampling_warnings(run: Run, settings: RimsSettings) -> list[str]:
+    """Filters that are left out. Wheels so coarsely sampled have nothing above the cutoff."""
     step = float(run.time[-1] - run.time[0]) / (len(run.time) - 1)
     filters = {
         "chassis.a_x": settings.a_x_cutoff_hz,
-        "wheel.*.z": settings.rim_cutoff_hz,
         "chassis.z, .pitch and .roll": settings.output_cutoff_hz,
     }
     return [
@@ -299,13 +247,27 @@ def _sampling_warnings(run: Run, settings: RimsSettings) -> list[str]:
     ]
 
 
-def _rolling_share(vehicle: Vehicle) -> float:
-    """Rolling resistance of the whole car over its weight: fr, wheels weighted by their load."""
-    load = static_loads(vehicle).tyre_load
-    resistance = sum(
-        load[corner] * vehicle.axle_at(corner).tyre.rolling_resistance for corner in CORNERS
-    )
-    return resistance / sum(load.values())
+def _moving_start(run: Run) -> list[str]:
+    """A body that moves where the model starts from equilibrium, by a line through 0.2 s."""
+    first = _first_samples(run)
+    since = run.time[first] - run.time[0]
+    moving = [
+        name
+        for name, limit in AT_REST.items()
+        if name in run
+        and abs(np.polynomial.polynomial.polyfit(since, run[name][first], 1)[1]) > limit
+    ]
+    if not moving:
+        return []
+    return [
+        f"Run {run.name} starts in motion ({', '.join(moving)}), but the model starts from "
+        'equilibrium; begin the run at rest, or take the initial state "measured".'
+    ]
+
+
+def _first_samples(run: Run) -> NDArray[np.int64]:
+    first = np.flatnonzero(run.time - run.time[0] <= START_WINDOW)
+    return first if len(first) >= FEWEST_SAMPLES else np.arange(FEWEST_SAMPLES)
 
 
 def _measured_start(run: Run) -> Array:
@@ -316,8 +278,7 @@ def _measured_start(run: Run) -> Array:
             f"Run {run.name} lacks {', '.join(missing)}; a measured start needs all three of "
             "chassis.z, .pitch and .roll, so start from equilibrium instead."
         )
-    first = np.flatnonzero(run.time - run.time[0] <= START_WINDOW)
-    first = first if len(first) >= FEWEST_SAMPLES else np.arange(FEWEST_SAMPLES)
+    first = _first_samples(run)
     since = run.time[first] - run.time[0]
     states = np.column_stack([run[name][first] for name in OUTPUT_CHANNELS])
     cubic = np.polynomial.polynomial.polyfit(since, states, 3)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from . import baseline
 from .car_rows import car_row, car_rows
-from .channels import Run
+from .channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
 from .demand import Demand, PiecewiseLinear, PostMotion
 from .errors import SimulationError
 from .filters import smoothed
@@ -29,7 +29,8 @@ from .observation import (
     torque_channels,
     traction_torques,
 )
-from .rims import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, RimsInputs, RimsSettings, prepare
+from .rims import RimsInputs, prepare
+from .rims_settings import RimsSettings
 from .road import Road
 from .stepping import prepare_free
 from .vehicle import Vehicle

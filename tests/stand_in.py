@@ -7,10 +7,9 @@ is the oracle.
 """
 
 import numpy as np
-from ridetune.engine.channels import Run
+from ridetune.engine.channels import INPUT_CHANNELS, OUTPUT_CHANNELS, Run
 from ridetune.engine.parameters import PARAMETER_NAMES
 from ridetune.engine.problem import DEFAULT_NOISE
-from ridetune.engine.rims import INPUT_CHANNELS, OUTPUT_CHANNELS
 
 from .factories import paper_vehicle
 

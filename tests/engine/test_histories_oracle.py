@@ -14,7 +14,8 @@ from ridetune.engine.channels import Run
 from ridetune.engine.demand import Demand, PiecewiseLinear, PostMotion
 from ridetune.engine.integration import free_states
 from ridetune.engine.manoeuvre import Manoeuvre
-from ridetune.engine.rims import RimsSettings, prepare
+from ridetune.engine.rims import prepare
+from ridetune.engine.rims_settings import RimsSettings
 from ridetune.engine.road import Road
 from ridetune.engine.simulation import rims_batch, simulate_rims, simulate_road
 from ridetune.engine.stepping import prepare_free
@@ -27,7 +28,7 @@ from ..oracles.mujoco_car import MujocoCar
 
 POSE = ("chassis.z", "chassis.pitch", "chassis.roll")
 ARMS = tuple(f"arm.{corner}.angle" for corner in ("fl", "fr", "rl", "rr"))
-UNFILTERED = RimsSettings(a_x_cutoff_hz=None)
+UNFILTERED = RimsSettings(a_x_cutoff_hz=None, rim_cutoff_hz=None)
 
 
 def smooth_road(amplitude=0.02, start=-4.0, spacing=0.02, end=80.0):
@@ -252,7 +253,8 @@ def test_rims_histories_are_those_of_the_multibody_program(seed, traction):
     """
     vehicle = random_vehicle(np.random.default_rng([10, seed]), braked=True)
     run = recording(np.linspace(0.0, 1.2, 25))
-    settings = RimsSettings(a_x_cutoff_hz=None, braking_intervals=((0.7, 2.0),), step=0.0025)
+    run = replace(run, braking=((0.7, 2.0),))
+    settings = replace(UNFILTERED, step=0.0025)
     simulated = simulate_rims(vehicle, run, traction=traction, settings=settings).run
     wheels = [f"wheel.{corner}.z" for corner in ("fl", "fr", "rl", "rr")]
     u = CubicSpline(run.time, np.column_stack([run[name] for name in wheels]))

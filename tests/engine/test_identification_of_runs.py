@@ -6,14 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ridetune.engine.campaign import drive_campaign
-from ridetune.engine.channels import Run
+from ridetune.engine.channels import WHEEL_CHANNELS, Run
 from ridetune.engine.fit import Outcome
 from ridetune.engine.identification import Problem, identify
 from ridetune.engine.measurement import read_run
 from ridetune.engine.parameters import PARAMETER_NAMES, PARAMETERS
 from ridetune.engine.problem import DEFAULT_NOISE
 from ridetune.engine.residuals import Residuals
-from ridetune.engine.rims import WHEEL_CHANNELS
 from ridetune.engine.simulation import rims_batch, simulate_rims
 from ridetune.engine.uncertainty import uncertainty
 from ridetune.engine.vehicle_file import read_vehicle

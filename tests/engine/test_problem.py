@@ -3,11 +3,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ridetune.engine.channels import Run
+from ridetune.engine.channels import INPUT_CHANNELS, OUTPUT_CHANNELS, Run
 from ridetune.engine.errors import MeasurementError, ParameterError, ProblemError
 from ridetune.engine.parameters import PARAMETER_NAMES
 from ridetune.engine.problem import DEFAULT_NOISE, FreeParameter, Problem
-from ridetune.engine.rims import INPUT_CHANNELS, OUTPUT_CHANNELS
 
 from ..factories import paper_vehicle
 

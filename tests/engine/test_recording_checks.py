@@ -1,7 +1,6 @@
 import numpy as np
-from ridetune.engine.channels import Run
+from ridetune.engine.channels import INPUT_CHANNELS, Run
 from ridetune.engine.recording_checks import check_recording
-from ridetune.engine.rims import INPUT_CHANNELS
 
 TIME = np.arange(0.0, 10.0, 0.005)
 PULL_AWAY = np.where((TIME > 2.0) & (TIME < 6.0), 2.0, 0.0)

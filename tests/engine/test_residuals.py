@@ -3,12 +3,13 @@ import threading
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from ridetune.engine.channels import OUTPUT_CHANNELS
 from ridetune.engine.errors import Cancelled
 from ridetune.engine.filters import low_pass
 from ridetune.engine.parameters import PARAMETER_NAMES
 from ridetune.engine.problem import DEFAULT_NOISE, Problem
 from ridetune.engine.residuals import FAILED_TRIAL, Residuals
-from ridetune.engine.rims import OUTPUT_CHANNELS, RimsSettings
+from ridetune.engine.rims_settings import RimsSettings
 
 from .. import stand_in
 

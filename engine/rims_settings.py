@@ -1,0 +1,45 @@
+"""How recordings are prepared for the rims mode: filters, initial state, longest step."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from .errors import SimulationError
+
+InitialState = Literal["equilibrium", "measured"]
+
+LONGEST_STEP = 0.02
+"""Beyond this the cubic splines of the wheels miss their own corners, s."""
+
+
+@dataclass(frozen=True, slots=True)
+class RimsSettings:
+    """How recordings are prepared; kept in every fit.
+
+    a_x_cutoff_hz, rim_cutoff_hz : zero-phase low-pass of a_x and of the wheels; None for none
+    output_cutoff_hz : low-pass of z, pitch and roll, applied to the model and to the measurement
+    initial_state : "equilibrium" (static under the first wheel displacements, at rest) or
+        "measured" (z, pitch, roll and their rates from the record's first 0.2 s)
+    step : longest integration step, s
+    """
+
+    a_x_cutoff_hz: float | None = 20.0
+    rim_cutoff_hz: float | None = 50.0
+    output_cutoff_hz: float | None = None
+    initial_state: InitialState = "equilibrium"
+    step: float = 0.005
+
+    def __post_init__(self) -> None:
+        """Refuse settings that mean nothing."""
+        for name in ("a_x_cutoff_hz", "rim_cutoff_hz", "output_cutoff_hz"):
+            cutoff = getattr(self, name)
+            if cutoff is not None and not 0.0 < cutoff < math.inf:
+                raise SimulationError(f"{name} is {cutoff}; give a positive frequency or none.")
+        if self.initial_state not in get_args(InitialState):
+            raise SimulationError(
+                f'initial_state is "{self.initial_state}"; it can be "equilibrium" or "measured".'
+            )
+        if not 0.0 < self.step <= LONGEST_STEP:
+            raise SimulationError(
+                f"step is {self.step} s; give a positive one of at most {LONGEST_STEP} s."
+            )

@@ -1,0 +1,20 @@
+import pytest
+from ridetune.engine.errors import SimulationError
+from ridetune.engine.rims_settings import RimsSettings
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"a_x_cutoff_hz": 0.0},
+        {"rim_cutoff_hz": float("nan")},
+        {"output_cutoff_hz": -1.0},
+        {"initial_state": "running"},
+        {"step": 0.0},
+        {"step": 0.1},
+    ],
+)
+def test_settings_that_mean_nothing_are_refused(wrong):
+    [name] = wrong
+    with pytest.raises(SimulationError, match=f"^{name} is"):
+        RimsSettings(**wrong)
