@@ -106,7 +106,7 @@ def _describe_simulate(command: Parser) -> None:
     command.add_argument("--road", metavar="FILE", help="road file in place of the manoeuvre's")
     command.add_argument("--model", choices=("8dof", "7dof"), default="8dof")
     command.add_argument("--lift-off", action="store_true", help="no tyre pulls at the road")
-    _add_traction(command)
+    _add_rims_mode(command, "--braking 6.2:9.8")
     command.add_argument("--seed", metavar="N", type=_seed, help="another random road")
     command.add_argument("-o", "--output", metavar="FILE", help="the run as CSV")
 
@@ -119,7 +119,7 @@ def _describe_identify(command: Parser) -> None:
     command.add_argument("--fixed", metavar="NAME", **several, help="identify all but these")
     command.add_argument("--bounds", metavar="NAME=LOW:HIGH", **several, help="SI units")
     command.add_argument("--start", metavar="NAME=VALUE", **several, help="SI units")
-    _add_traction(command)
+    _add_rims_mode(command, "--braking lap_2.csv=6.2:9.8")
     _add_noise(command, "noise of the recordings")
     command.add_argument("-o", "--output", metavar="FILE", help="the fit as JSON")
 
@@ -142,8 +142,27 @@ def _add_vehicle(command: Parser) -> None:
     )
 
 
-def _add_traction(command: Parser) -> None:
+def _add_rims_mode(command: Parser, example: str) -> None:
+    """How the recordings drive the model; see engine.rims_settings for what holds untold."""
     command.add_argument("--traction", choices=("exact", "paper"), help="exact unless told")
+    command.add_argument(
+        "--initial-state",
+        choices=("equilibrium", "measured"),
+        help="of the body; equilibrium unless told",
+    )
+    for option, what in (
+        ("--a-x-cutoff", "a_x, 20 unless told"),
+        ("--rim-cutoff", "the wheels, 50 unless told"),
+        ("--output-cutoff", "z, pitch and roll, recorded and simulated; none unless told"),
+    ):
+        command.add_argument(option, metavar="HZ|none", help=f"low-pass of {what}")
+    command.add_argument(
+        "--braking",
+        metavar="BEGIN:END",
+        nargs="+",
+        action="extend",
+        help=f"when the car brakes, s, in place of what a_x shows; e.g. {example}; none for never",
+    )
 
 
 def _add_noise(command: Parser, what: str) -> None:

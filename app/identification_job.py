@@ -11,7 +11,7 @@ from ..engine.channels import Run
 from .errors import OverBudget
 from .job_store import Job
 from .jobs import Kind
-from .recordings import Recordings
+from .recordings import Recordings, with_braking
 from .settings import Limits
 from .store import Measurement, Store
 from .worker import Report
@@ -25,14 +25,22 @@ def identification(store: Store, recordings: Recordings) -> Kind:
 
     def payload(job: Job) -> dict[str, Any]:
         kept = [store.measurement(job.session, run["id"]) for run in job.spec["runs"]]
-        return {**job.spec, "runs": [recordings.run(measurement) for measurement in kept]}
+        return {**job.spec, "runs": marked_runs(job.spec, kept, recordings)}
 
     return Kind(task=identify_runs, payload=payload)
+
+
+def marked_runs(
+    spec: Mapping[str, Any], kept: list[Measurement], recordings: Recordings
+) -> list[Run]:
+    """The recordings, with their braking where the request marks it."""
+    return [with_braking(recordings.run(one), spec["braking"].get(one.id)) for one in kept]
 
 
 def build_problem(spec: Mapping[str, Any], runs: list[Run]) -> Any:
     """The engine's problem; raises what a person can mend."""
     from ..engine.problem import Problem
+    from ..engine.rims_settings import RimsSettings
     from ..engine.vehicle_file import vehicle_from_json
 
     return Problem.build(
@@ -44,6 +52,7 @@ def build_problem(spec: Mapping[str, Any], runs: list[Run]) -> Any:
         start=spec["start"],
         noise=spec["noise"],
         traction=spec["traction"],
+        settings=RimsSettings(**spec["settings"]),
     )
 
 

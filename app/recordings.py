@@ -5,7 +5,7 @@ The original on disk stays the truth; a run here can always be read again from i
 
 import threading
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -58,6 +58,11 @@ def parse(data: bytes, name: str) -> Run:
             f"{name}: the file is too large or too deep to read ({type(error).__name__}); "
             "send a plain CSV."
         ) from None
+
+
+def with_braking(run: Run, intervals: Iterable[tuple[float, float]] | None) -> Run:
+    """The run with its braking marked, if it is marked."""
+    return run if intervals is None else replace(run, braking=tuple(map(tuple, intervals)))
 
 
 def summary(run: Run) -> dict[str, Any]:

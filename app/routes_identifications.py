@@ -9,9 +9,9 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from ..engine.vehicle_file import vehicle_from_json, vehicle_to_json
 from .access import SessionId
-from .errors import NotFound
+from .errors import BadRequest, NotFound
 from .frames import clean
-from .identification_job import KIND, build_problem, check_budget
+from .identification_job import KIND, build_problem, check_budget, marked_runs
 from .job_store import Job
 from .schemas import IdentificationRequest
 from .services import Services, Shared
@@ -57,7 +57,12 @@ def _submitted(services: Services, sid: str, body: IdentificationRequest) -> dic
     spec = body.model_dump(mode="json", exclude={"key", "runs", "vehicle"})
     spec["vehicle"] = vehicle_to_json(vehicle_from_json(vehicle))
     spec["runs"] = [{"id": one.id, "name": one.name} for one in kept]
-    problem = build_problem(spec, [services.recordings.run(one) for one in kept])
+    if strangers := set(body.braking) - {one.id for one in kept}:
+        raise BadRequest(
+            f"Braking is marked for {min(strangers)}, which is not among the runs; leave it out or "
+            "add the run."
+        )
+    problem = build_problem(spec, marked_runs(spec, kept, services.recordings))
     spec["names"] = [parameter.name for parameter in problem.free]
     return job_to_json(services.jobs.submit(sid, KIND, spec, body.key))
 

@@ -9,10 +9,15 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, StringConstraints
 
+from ..engine.rims_settings import InitialState, RimsSettings
+
 JsonObject = Mapping[str, Any]
 Name = Annotated[str, StringConstraints(min_length=1, max_length=100)]
 Names = Annotated[list[Name], Field(max_length=200)]
 Traction = Literal["exact", "paper"]
+Cutoff = Annotated[FiniteFloat, Field(gt=0)] | None
+Intervals = Annotated[list[tuple[FiniteFloat, FiniteFloat]], Field(max_length=100)]
+RIMS = RimsSettings()
 
 
 class WireForm(BaseModel):
@@ -21,11 +26,29 @@ class WireForm(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+class RimsSettingsForm(WireForm):
+    """How recordings are prepared for the rims mode; null for no filter."""
+
+    a_x_cutoff_hz: Cutoff = RIMS.a_x_cutoff_hz
+    rim_cutoff_hz: Cutoff = RIMS.rim_cutoff_hz
+    output_cutoff_hz: Cutoff = RIMS.output_cutoff_hz
+    initial_state: InitialState = RIMS.initial_state
+
+    def settings(self) -> RimsSettings:
+        """The engine's settings."""
+        return RimsSettings(**self.model_dump())
+
+
 class RimsRequest(WireForm):
-    """Let the model follow the wheel centres of a measurement."""
+    """Let the model follow the wheel centres of a measurement.
+
+    braking : (begin, end) where the car brakes, s; without it, what a_x shows
+    """
 
     measurement: Name
     traction: Traction = "exact"
+    settings: RimsSettingsForm = RimsSettingsForm()
+    braking: Intervals | None = None
 
 
 class PostsRequest(WireForm):
@@ -65,7 +88,10 @@ class RoadPreview(WireForm):
 
 
 class IdentificationRequest(WireForm):
-    """Find parameters of the session's car (or of another start) from measurements."""
+    """Find parameters of the session's car (or of another start) from measurements.
+
+    braking : by measurement, (begin, end) where the car brakes, s; for others what a_x shows
+    """
 
     runs: Annotated[list[Name], Field(max_length=20)]
     vehicle: JsonObject | None = None
@@ -75,4 +101,6 @@ class IdentificationRequest(WireForm):
     start: Annotated[dict[Name, FiniteFloat], Field(max_length=50)] = {}
     noise: Annotated[dict[Name, FiniteFloat], Field(max_length=50)] = {}
     traction: Traction = "exact"
+    settings: RimsSettingsForm = RimsSettingsForm()
+    braking: Annotated[dict[Name, Intervals], Field(max_length=20)] = {}
     key: Name | None = None

@@ -17,7 +17,7 @@ from ..engine.simulation import simulate_posts, simulate_rims, simulate_road
 from ..engine.vehicle import Vehicle
 from ..engine.vehicle_file import vehicle_from_json
 from .errors import BadRequest, NotFound, OverBudget
-from .recordings import Recordings
+from .recordings import Recordings, with_braking
 from .schemas import SimulationRequest
 from .settings import Limits
 from .store import Measurement, Store
@@ -131,7 +131,11 @@ def _follow(
         return Task(
             vehicle,
             lambda: simulate_rims(
-                vehicle, recordings.run(kept), traction=rims.traction, model=request.model
+                vehicle,
+                with_braking(recordings.run(kept), rims.braking),
+                traction=rims.traction,
+                settings=rims.settings.settings(),
+                model=request.model,
             ),
         )
     assert request.posts is not None

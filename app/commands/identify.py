@@ -10,7 +10,7 @@ from ...engine.fit_file import fit_to_json
 from ...engine.identification import identify as fit_to_runs
 from ...engine.measurement import read_run
 from ...engine.problem import Problem
-from .inputs import bounds, find_vehicle, read_noise, starts
+from .inputs import bounds, find_vehicle, read_noise, rims_settings, starts, with_braking
 from .output import (
     print_fit_percent,
     print_table,
@@ -27,12 +27,13 @@ def identify(options: Namespace) -> None:
     noise = read_noise(options.noise)
     problem = Problem.build(
         find_vehicle(options.vehicle),
-        [read_run(path, noise=noise) for path in options.runs],
+        with_braking([read_run(path, noise=noise) for path in options.runs], options.braking),
         options.free or None,
         options.fixed or None,
         bounds=bounds(options.bounds),
         start=starts(options.start),
         traction=options.traction or "exact",
+        settings=rims_settings(options),
     )
     watched = sys.stderr.isatty()
     fit = fit_to_runs(problem, progress=_show if watched else None)

@@ -1,18 +1,23 @@
 """What the commands' arguments name: a vehicle, a manoeuvre, noise, values of parameters."""
 
-from collections.abc import Iterable, Mapping
+from argparse import Namespace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
+from ...engine.channels import Run
 from ...engine.errors import (
     ManoeuvreError,
     MeasurementError,
     ParameterError,
     RideError,
+    SimulationError,
     VehicleError,
 )
 from ...engine.manoeuvre import Manoeuvre, read_manoeuvre, reference_manoeuvres
+from ...engine.rims_settings import RimsSettings
 from ...engine.run_notes import read_notes
 from ...engine.vehicle import Vehicle
 from ...engine.vehicle_file import read_vehicle, reference_vehicles
@@ -73,6 +78,55 @@ def bounds(assignments: Iterable[str]) -> dict[str, tuple[float, float]]:
             raise ParameterError(f"The bounds {name}={text} lack a colon; write {name}=LOW:HIGH.")
         limits[name] = (_number(lower, name), _number(upper, name))
     return limits
+
+
+def rims_settings(options: Namespace) -> RimsSettings:
+    """How the recordings are prepared, as far as the options tell."""
+    told: dict[str, Any] = {}
+    for field in ("a_x_cutoff", "rim_cutoff", "output_cutoff"):
+        text = getattr(options, field)
+        if text is not None:
+            told[f"{field}_hz"] = None if text == "none" else _frequency(text, field)
+    if options.initial_state:
+        told["initial_state"] = options.initial_state
+    return RimsSettings(**told)
+
+
+def _frequency(text: str, field: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        option = field.replace("_", "-")
+        raise SimulationError(f"--{option} {text}: give a frequency in Hz, or none.") from None
+
+
+def with_braking(runs: Sequence[Run], marks: Sequence[str] | None) -> list[Run]:
+    """The runs with the braking that [RUN=]BEGIN:END or [RUN=]none marks."""
+    marked: dict[str, list[tuple[float, float]]] = {}
+    for mark in marks or ():
+        name, _, text = mark.rpartition("=")
+        if not name and len(runs) > 1:
+            raise MeasurementError(f"--braking {mark} names no run of several; write RUN={mark}.")
+        name = Path(name).name or runs[0].name
+        if name not in (run.name for run in runs):
+            known = ", ".join(run.name for run in runs)
+            raise MeasurementError(f"--braking {mark}: there is no run {name}; there are {known}.")
+        intervals = marked.setdefault(name, [])
+        if text != "none":
+            begin, _, end = text.partition(":")
+            intervals.append((_second(begin, mark), _second(end, mark)))
+    return [
+        replace(run, braking=tuple(marked[run.name])) if run.name in marked else run for run in runs
+    ]
+
+
+def _second(text: str, mark: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise MeasurementError(
+            f"--braking {mark} is no interval; write BEGIN:END in seconds, or none."
+        ) from None
 
 
 def _pairs(assignments: Iterable[str], form: str) -> list[tuple[str, str]]:

@@ -7,10 +7,19 @@ from ...engine.errors import SimulationError
 from ...engine.measurement import read_run, run_to_csv
 from ...engine.road_file import read_road
 from ...engine.simulation import Simulation, simulate_posts, simulate_rims, simulate_road
-from .inputs import find_manoeuvre, find_vehicle
+from .inputs import find_manoeuvre, find_vehicle, rims_settings, with_braking
 from .output import print_fit_percent, print_warnings, require_place, write_file
 
-BELONGS_TO = {"road": "--manoeuvre", "seed": "--manoeuvre", "traction": "--rims"}
+BELONGS_TO = {
+    **dict.fromkeys(("road", "seed"), "--manoeuvre"),
+    **dict.fromkeys(
+        (
+            *("traction", "initial_state", "braking"),
+            *("a_x_cutoff", "rim_cutoff", "output_cutoff"),
+        ),
+        "--rims",
+    ),
+}
 """Options that mean something in one mode only."""
 
 
@@ -19,7 +28,8 @@ def simulate(options: Namespace) -> None:
     mode = next(name for name in ("manoeuvre", "rims", "posts") if getattr(options, name))
     for option, home in BELONGS_TO.items():
         if getattr(options, option) is not None and home != f"--{mode}":
-            raise SimulationError(f"--{option} belongs to {home}; it means nothing with --{mode}.")
+            shown = option.replace("_", "-")
+            raise SimulationError(f"--{shown} belongs to {home}; it means nothing with --{mode}.")
     if options.lift_off and mode == "rims":
         raise SimulationError("--lift-off means nothing with --rims, where tyres play no part.")
     if not options.output and mode != "rims":
@@ -53,10 +63,12 @@ def _road(options: Namespace) -> Simulation:
 
 
 def _rims(options: Namespace) -> Simulation:
+    [run] = with_braking([read_run(options.rims)], options.braking)
     return simulate_rims(
         find_vehicle(options.vehicle),
-        read_run(options.rims),
+        run,
         traction=options.traction or "exact",
+        settings=rims_settings(options),
         model=options.model,
     )
 

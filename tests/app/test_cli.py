@@ -80,6 +80,8 @@ def test_describing_the_commands_imports_no_engine():
         ("simulate --vehicle paper --manoeuvre heave --road r.csv -o r.csv", "leave out --road"),
         ("simulate --vehicle paper --manoeuvre 1 --seed -1 -o r.csv", "'-1'"),
         ("simulate --vehicle paper --manoeuvre 1 --traction paper -o r.csv", "--rims"),
+        ("simulate --vehicle paper --manoeuvre 1 --rim-cutoff 20 -o r.csv", "--rim-cutoff belongs"),
+        ("simulate --vehicle paper --posts r.csv --braking 1:2 -o r.csv", "--braking belongs"),
         ("simulate --vehicle paper --rims run.csv --lift-off", "--lift-off"),
         ("simulate --vehicle paper --rims run.csv", "run.csv"),
         ("simulate --vehicle paper --posts run.csv -o r.csv", "run.csv"),
@@ -105,9 +107,15 @@ def test_bad_command_is_refused_in_one_line_that_names_the_place(folder, capsys,
         ("--start front.pivot.angle", "NAME=VALUE"),
         ("--start front.pivot.angle=two", "'two'"),
         ("--free K_F --fixed K_F", "both as free and as fixed"),
+        ("--rim-cutoff fast", "--rim-cutoff fast: give a frequency in Hz, or none"),
+        ("--a-x-cutoff -3", "a_x_cutoff_hz is -3"),
+        ("--braking 2", "BEGIN:END in seconds, or none"),
+        ("--braking 3:2", "begin first"),
+        ("--braking 8:9", "it lasts from 0 to 4 s"),
+        ("--braking lap.csv=1:2", "there is no run lap.csv; there are driven.csv"),
     ],
 )
-def test_bad_parameter_is_refused(driven, capsys, option, told):
+def test_bad_option_is_refused(driven, capsys, option, told):
     error = refused(capsys, "identify", str(driven), "--vehicle", "paper", *option.split())
     assert told in error
 
@@ -227,6 +235,22 @@ def test_identified_car_and_report(folder, driven, capsys):
         assert read_vehicle("fit.json").value(path) == pytest.approx(truth.value(path), rel=1e-3)
 
     assert main(["simulate", "--vehicle", "fit.json", "--rims", str(driven)]) == 0
+
+
+def test_how_a_recording_is_prepared_is_the_caller_s_and_is_kept(folder, driven):
+    """Several runs need a name with each mark; "none" is a mark too."""
+    run = read_run(driven)
+    write_run(Run("lap", run.time, {name: 1.1 * run[name] for name in RECORDED}), "lap.csv")
+    command = ["identify", str(driven), "lap.csv", "--vehicle", "paper", "--free", "K_F"]
+    command += ["--a-x-cutoff", "none", "--rim-cutoff", "30", "--initial-state", "measured"]
+    assert main([*command, "--braking", "1:2"]) == 2
+    marks = ["lap.csv=2.5:3", "lap.csv=1:2", f"{driven}=none"]
+    assert main([*command, "--braking", *marks, "-o", "fit.json"]) == 0
+    fit = json.loads((folder / "fit.json").read_text())
+    settings = {"a_x_cutoff_hz": None, "rim_cutoff_hz": 30.0, "output_cutoff_hz": None}
+    settings |= {"initial_state": "measured", "step": 0.005}
+    assert fit["settings"] == settings
+    assert [run["braking"] for run in fit["runs"]] == [[], [[2.5, 3.0], [1.0, 2.0]]]
 
 
 def test_a_channel_with_the_wrong_sign_ends_in_a_warning_that_names_it(folder, driven, capsys):

@@ -62,6 +62,26 @@ def test_two_parameters_come_back_from_the_twins_recording(engineer):
     assert applied.json() == ended["result"]["vehicle"]
 
 
+def test_marked_braking_and_settings_are_used_and_kept(engineer):
+    recording = SAMPLES / "paper_twin_2.csv"
+    run = engineer.upload(recording.read_bytes(), recording.name).json()["id"]
+    asked = {
+        "runs": [run],
+        "free": ["rear.suspension.stiffness"],
+        "settings": {"rim_cutoff_hz": 40.0},
+        "braking": {run: [[12.0, 15.0]]},
+    }
+    stranger = engineer.post("/identifications", json={**asked, "braking": {"x": [[1, 2]]}})
+    assert (stranger.status_code, "not among the runs" in stranger.text) == (400, True)
+    beyond = engineer.post("/identifications", json={**asked, "braking": {run: [[50, 60]]}})
+    assert (beyond.status_code, "mark a time in it" in beyond.text) == (422, True)
+    job = engineer.post("/identifications", json=asked).json()["id"]
+    result = wait_for(engineer, job, "done", "failed")["result"]
+    assert result["settings"]["rim_cutoff_hz"] == 40.0
+    assert result["settings"]["a_x_cutoff_hz"] == 20.0
+    assert result["runs"][0]["braking"] == [[12.0, 15.0]]
+
+
 def test_a_running_identification_is_cancelled(engineer):
     runs = [kept["id"] for kept in engineer.get("/measurements").json()][:2]
     job = engineer.post("/identifications", json={"runs": runs}).json()["id"]

@@ -2,6 +2,7 @@
 
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,10 +12,12 @@ from ridetune.app.main import create_app
 from ridetune.app.settings import Settings
 from ridetune.app.warmup import WarmUp
 from ridetune.engine.manoeuvre import reference_manoeuvres
-from ridetune.engine.simulation import simulate_road
-from ridetune.engine.vehicle_file import reference_vehicles, vehicle_to_json
+from ridetune.engine.measurement import read_run
+from ridetune.engine.rims_settings import RimsSettings
+from ridetune.engine.simulation import simulate_rims, simulate_road
+from ridetune.engine.vehicle_file import reference_vehicles, vehicle_from_json, vehicle_to_json
 
-from .conftest import ADDRESS, Visitor, open_client
+from .conftest import ADDRESS, SAMPLES, Visitor, open_client
 from .test_frames import read_binary
 
 BINARY = {"Accept": "application/vnd.ridetune.frames"}
@@ -81,6 +84,24 @@ def test_a_recording_is_followed_on_its_rims(driver, recording):
     assert np.all(np.isfinite(values["chassis.z"]))
 
 
+def test_a_recording_is_prepared_as_the_request_says(driver):
+    """Oracle: the engine, told the same; each of the three changes what comes out."""
+    path = SAMPLES / "paper_twin_1.csv"
+    recording = driver.upload(path.read_bytes(), "twin.csv").json()["id"]
+    car, run = vehicle_from_json(PAPER), replace(read_run(path), braking=((2.0, 6.0),))
+    told = {"rim_cutoff_hz": 8.0, "a_x_cutoff_hz": None, "initial_state": "measured"}
+    expected = simulate_rims(car, run, settings=RimsSettings(**told)).run["chassis.pitch"]
+    found = []
+    for settings, braking in ((told, [[2.0, 6.0]]), (told, None), ({}, [[2.0, 6.0]])):
+        rims = {"measurement": recording, "settings": settings, "braking": braking}
+        body = {"vehicle": PAPER, "rims": rims, "channels": ["chassis.pitch"]}
+        _, values = read_binary(driver.post("/simulations", json=body, headers=BINARY).content)
+        found.append(values["chassis.pitch"])
+    assert_allclose(found[0], expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+    assert np.abs(found[1] - found[0]).max() > 1e-4
+    assert np.abs(found[2] - found[0]).max() > 1e-4
+
+
 def test_a_rig_test_and_a_recorded_one_agree(driver):
     """A simulation's own CSV with the posts' heights, uploaded, moves the car the same way."""
     heave = {**driver.client.get("/api/manoeuvres/heave").json(), "duration": 3.0}
@@ -132,6 +153,11 @@ REFUSED = {
         {"vehicle": {**PAPER, "chassis": {**PAPER["chassis"], "mass": -1}}},
         422,
         "chassis.mass",
+    ),
+    "no frequency": (
+        {"rims": {"measurement": "x", "settings": {"rim_cutoff_hz": 0}}},
+        422,
+        "rims.settings.rim_cutoff_hz",
     ),
     "one sample": ({"max_samples": 1}, 422, "max_samples"),
     "unknown model": ({"model": "14dof"}, 422, "model"),
