@@ -1,6 +1,6 @@
 """Road: the height under the left and the right wheels as a smooth function of distance.
 
-Each side is one C2 cubic spline through heights on a uniform grid along X (inertial frame, X = 0 is
+Each side is piecewise cubic through heights on a uniform grid along X (inertial frame, X = 0 is
 where the car's centre of gravity stands at t = 0). Its slope is zero at both ends and outside the
 height is held, so the road is C1 everywhere. On cell k, with s = (X - start)/spacing - k in [0, 1),
 
@@ -8,12 +8,15 @@ height is held, so the road is C1 everywhere. On cell k, with s = (X - start)/sp
 """
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicHermiteSpline, CubicSpline, PchipInterpolator
 
 from .errors import RoadError
+
+Interpolant = Literal["spline", "monotone"]
 
 LEFT, RIGHT = 0, 1
 """Sides of a road, in the order of its coefficients."""
@@ -27,6 +30,8 @@ class Road:
     spacing : distance between points, m
     left, right : heights, m, shape (n,), n >= 2
     name : what a chart calls it
+    interpolant : "spline" is C2, for heights that are smooth on the grid; "monotone" is C1 and never
+        leaves the range of the two heights beside X, for heights that may hold kerbs
     coefficients : (2, n - 1, 4), C-contiguous; c0 ... c3 of each cell of left and right
 
     Raises RoadError for heights that are not finite or unequal in number.
@@ -37,10 +42,11 @@ class Road:
     left: NDArray[np.float64]
     right: NDArray[np.float64]
     name: str = ""
+    interpolant: Interpolant = "spline"
     coefficients: NDArray[np.float64] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Check the profiles and fit their splines."""
+        """Check the profiles and join their points."""
         profiles = [np.array(side, dtype=float) for side in (self.left, self.right)]
         if profiles[LEFT].ndim != 1 or profiles[LEFT].shape != profiles[RIGHT].shape:
             raise RoadError("A road needs as many heights on the left as on the right.")
@@ -50,7 +56,8 @@ class Road:
             raise RoadError("A road's heights must all be finite numbers.")
         if not (np.isfinite(self.start) and 0 < self.spacing < np.inf):
             raise RoadError("A road needs a finite start and a positive spacing.")
-        cells = np.stack([level_spline(profile) for profile in profiles])
+        join = level_spline if self.interpolant == "spline" else level_monotone
+        cells = np.stack([join(profile) for profile in profiles])
         for array in (*profiles, cells):
             array.flags.writeable = False
         object.__setattr__(self, "left", profiles[LEFT])
@@ -96,3 +103,15 @@ def level_spline(heights: NDArray[np.float64]) -> NDArray[np.float64]:
     """Coefficients (n - 1, 4) of the C2 spline on a unit grid with zero slope at both ends."""
     spline = CubicSpline(np.arange(heights.size), heights, bc_type="clamped")
     return np.ascontiguousarray(spline.c.T)
+
+
+def level_monotone(heights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Coefficients (n - 1, 4) of the monotone C1 cubic on a unit grid, level at both ends.
+
+    Slopes are those of Fritsch and Butland (PCHIP), zero wherever the heights turn; a zero slope
+    at the ends keeps every cell monotone.
+    """
+    grid = np.arange(heights.size, dtype=np.float64)
+    slopes = np.append(PchipInterpolator(grid, heights).c[2], 0.0)
+    slopes[0] = 0.0
+    return np.ascontiguousarray(CubicHermiteSpline(grid, heights, slopes).c.T)

@@ -1,8 +1,10 @@
 """Road files: CSV with the columns `x [m]`, `left [m]` and `right [m]`, in any order and unit.
 
-X need not be uniform: a C2 spline through the points is sampled on a uniform grid whose spacing is
-the file's least one. X = 0 is where the car's CG stands at the start. Heights count from the
-road's beginning (the mean of both tracks there), so a survey's elevations above the sea do as well.
+The points are joined by a monotone C1 cubic (PCHIP), which never leaves the range of the two
+heights beside it: a kerb stays a kerb, where a C2 spline would ring. X need not be uniform: the
+cubic is then sampled on a uniform grid whose spacing is the file's least one. X = 0 is where the
+car's CG stands at the start. Heights count from the road's beginning (the mean of both tracks
+there), so a survey's elevations above the sea do as well.
 """
 
 import io
@@ -12,7 +14,7 @@ from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import PchipInterpolator
 
 from .csv_table import LARGEST_FILE, CsvTable
 from .errors import MeasurementError, RoadError
@@ -32,6 +34,10 @@ MOST_POINTS = 1_000_000
 
 TALLEST = 20.0
 """Greatest height (m) above or below the road's beginning: beyond it, a unit is wrong."""
+
+HIGHEST_STEP, STEEPEST = 0.5, 1.0
+"""Greatest rise (m) between two points steeper than the second number: beyond both, a unit is
+wrong."""
 
 UNIFORM_TOLERANCE = 1e-3
 """X that is within this share of a step of a uniform grid counts as uniform."""
@@ -88,12 +94,12 @@ def _road(stream: BinaryIO, source: str) -> Road:
         )
     beginning = 0.5 * (left[0] + right[0])
     left, right = left - beginning, right - beginning
+    # What lies between the points neither is higher nor rises more than they do.
     _check_magnitudes(x, left, right, source)
     grid, spacing = _uniform_grid(x, source)
-    if grid is x:
-        return Road(float(x[0]), spacing, left, right, name=source)
-    heights = CubicSpline(x, np.column_stack([left, right]), bc_type="clamped")(grid)
-    return Road(float(x[0]), spacing, heights[:, 0], heights[:, 1], name=source)
+    if grid is not x:
+        left, right = PchipInterpolator(x, np.stack([left, right]), axis=1)(grid)
+    return Road(float(x[0]), spacing, left, right, name=source, interpolant="monotone")
 
 
 def _columns(header: list[str], source: str) -> list[tuple[int, float]]:
@@ -127,7 +133,7 @@ def _columns(header: list[str], source: str) -> list[tuple[int, float]]:
 
 
 def _check_magnitudes(x: NDArray, left: NDArray, right: NDArray, source: str) -> None:
-    """Raise RoadError for a road so long or so high that its unit must be wrong."""
+    """Raise RoadError for a road so long, high or rough that its unit must be wrong."""
     if x[-1] - x[0] > LONGEST:
         raise RoadError(
             f"{source}: the road is {x[-1] - x[0]:g} m long, more than {LONGEST:g} m; check the"
@@ -139,6 +145,14 @@ def _check_magnitudes(x: NDArray, left: NDArray, right: NDArray, source: str) ->
             raise RoadError(
                 f"{source}: {name} rises or falls by {highest:g} m, more than {TALLEST:g} m; check"
                 f" its unit, e.g. {name} [mm]."
+            )
+        rises = np.abs(np.diff(heights))
+        rises[rises <= STEEPEST * np.diff(x)] = 0.0
+        if rises.max() > HIGHEST_STEP:
+            at = int(np.argmax(rises))
+            raise RoadError(
+                f"{source}: {name} rises or falls by {rises[at]:g} m between x = {x[at]:g} and"
+                f" {x[at + 1]:g} m; check its unit, e.g. {name} [mm]."
             )
 
 

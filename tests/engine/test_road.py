@@ -1,11 +1,11 @@
-"""A road is one C2 spline a side, level beyond its ends."""
+"""A road is one piecewise cubic a side, level beyond its ends."""
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from ridetune.engine.errors import RoadError
 from ridetune.engine.road import LEFT, RIGHT, Road
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, PchipInterpolator
 
 
 @pytest.fixture
@@ -64,6 +64,18 @@ def test_level_ground_is_level_everywhere():
     for side in (LEFT, RIGHT):
         assert not Road.flat().height(side, x).any()
         assert not Road.flat().slope(side, x).any()
+
+
+def test_a_monotone_road_joins_smoothly_and_ends_level(rng):
+    """Oracle: scipy's PCHIP away from the ends; equal heights and slopes where cells meet."""
+    heights = rng.normal(size=41)
+    road = Road(0.0, 0.5, heights, -heights, interpolant="monotone")
+    inner = np.linspace(road.x[1], road.x[-2], 501)
+    assert_allclose(road.height(LEFT, inner), PchipInterpolator(road.x, heights)(inner), atol=1e-12)
+    c0, c1, c2, c3 = np.moveaxis(road.coefficients[:, :-1], -1, 0)
+    assert_allclose(c0 + c1 + c2 + c3, road.coefficients[:, 1:, 3], atol=1e-12)
+    assert_allclose(3 * c0 + 2 * c1 + c2, road.coefficients[:, 1:, 2], atol=1e-12)
+    assert_allclose(road.slope(LEFT, [road.start, road.end]), 0.0, atol=1e-12)
 
 
 def test_a_road_keeps_its_own_copy_of_the_heights():

@@ -6,7 +6,6 @@ from numpy.testing import assert_allclose
 from ridetune.engine.errors import RoadError
 from ridetune.engine.road import LEFT, RIGHT
 from ridetune.engine.road_file import parse_road, read_road
-from scipy.interpolate import CubicSpline
 
 HEAD = "x [m],left [m],right [m]\n"
 
@@ -26,25 +25,55 @@ def test_a_uniform_profile_is_taken_point_by_point():
     assert road.name == "r.csv"
 
 
-def test_a_profile_at_other_points_keeps_its_smooth_shape():
-    """Oracle: the sine itself. A spline of steps up to 0.3 m errs by 0.3^4/384 of its 10 mm, and
-    what the level ends disturb fades by half a point at the least."""
-    rng = np.random.default_rng(1)
-    x = np.cumsum(rng.uniform(0.1, 0.3, 200))
-    left, right = 0.01 * np.sin(x), 0.01 * np.cos(x)
-    road = parse_road(csv(x, left, right), "r.csv")
-    at = np.linspace(x[20], x[-21], 500)
-    beginning = (left[0] + right[0]) / 2
-    assert_allclose(road.height(LEFT, at), 0.01 * np.sin(at) - beginning, rtol=0, atol=1e-6)
-    assert_allclose(road.height(RIGHT, at), 0.01 * np.cos(at) - beginning, rtol=0, atol=1e-6)
+@pytest.mark.parametrize("uneven", [False, True])
+def test_a_kerb_stays_between_its_two_levels(uneven):
+    """Oracle: the profile's own range, 0 to 50 mm; before and after the kerb it is level."""
+    x = np.arange(0.0, 10.0, 0.1)
+    if uneven:
+        x = np.delete(x, [3, 4, 20, 51, 70])
+    kerb = np.where(x > 4.95, 0.05, 0.0)
+    road = parse_road(csv(x, kerb, -kerb), "r.csv")
+    at = np.linspace(-1.0, 11.0, 12_001)
+    for side, sign in ((LEFT, 1.0), (RIGHT, -1.0)):
+        height = sign * road.height(side, at)
+        assert height.min() >= 0.0
+        assert height.max() <= 0.05 + 1e-15
+        assert not height[at < 4.8].any()
+        assert_allclose(height[at > 5.3], 0.05, rtol=0, atol=1e-15)
 
 
-def test_resampling_follows_the_spline_through_the_points():
-    """Oracle: scipy's clamped spline through the file's points, at the road's own grid."""
-    x, left = np.array([0.0, 1.0, 1.5, 2.5, 4.0]), np.array([0.0, 0.01, -0.01, 0.02, 0.0])
-    road = parse_road(csv(x, left, 0 * x), "r.csv")
-    assert road.spacing <= 0.5
-    assert_allclose(road.left, CubicSpline(x, left, bc_type="clamped")(road.x), atol=1e-14)
+def test_no_height_leaves_the_range_of_the_points_beside_it():
+    """Oracle: the definition of a monotone interpolant, on rough random points."""
+    heights = np.random.default_rng(5).normal(scale=0.02, size=200)
+    road = parse_road(csv(0.25 * np.arange(200), heights, 0 * heights), "r.csv")
+    share = np.linspace(0.0, 1.0, 21)[:, np.newaxis]
+    found = road.height(LEFT, road.x[:-1] + 0.25 * share)
+    lower, upper = (
+        np.minimum(road.left[:-1], road.left[1:]),
+        np.maximum(road.left[:-1], road.left[1:]),
+    )
+    assert np.all(found >= lower - 1e-12)
+    assert np.all(found <= upper + 1e-12)
+
+
+def test_a_smooth_profile_at_uneven_points_is_approached_with_their_distance():
+    """Oracle: the sine itself. A monotone cubic is level where the heights turn, so its order is
+    2 there: halving the distance must take the greatest error down about fourfold."""
+    errors = []
+    for distance in (0.2, 0.1, 0.05):
+        rng = np.random.default_rng(1)
+        x = (
+            np.arange(0.0, 30.0, distance)
+            + rng.uniform(-0.2, 0.2, round(30.0 / distance)) * distance
+        )
+        left = 0.01 * np.sin(x)
+        road = parse_road(csv(x, left, left), "r.csv")
+        at = np.linspace(x[5], x[-6], 5001)
+        errors.append(np.abs(road.height(LEFT, at) + left[0] - 0.01 * np.sin(at)).max())
+    # The sag of a chord, h^2/8 of the curvature, bounds what a level top can cut off.
+    assert errors[0] < 0.01 * (1.4 * 0.2) ** 2 / 8 * 2
+    order = np.log2(errors[0] / errors[-1]) / 2
+    assert 1.5 < order < 3.0
 
 
 def test_units_order_and_other_columns_do_not_matter():
@@ -76,6 +105,10 @@ def test_elevation_above_the_sea_counts_from_the_beginning_and_keeps_the_cross_s
         (b"x [m],left [m],left [mm]\n0,0,0\n", "columns 2 and 3 are both left; keep one"),
         (b"x [s],left [m],right [m]\n0,0,0\n", r"column 1 \(x \[s\]\): .*write a length"),
         (HEAD.encode() + b"0,0,0\n1,5000,0\n2,0,0\n", r"left rises or falls by 5000 m.*unit"),
+        (
+            HEAD.encode() + b"0,0,0\n0.1,0,0\n0.2,0,8\n",
+            r"right rises or falls by 8 m between x = 0.1 and 0.2 m; check its unit, e.g. right",
+        ),
         (HEAD.encode() + b"0,0,0\n1e9,0,0\n2e9,0,0\n", "2e\\+09 m long, more than 100000 m"),
         (HEAD.encode() + b"0,0,0\n1e-7,0,0\n9e4,0,0\n", "thin out the closest points"),
         (bytes(range(256)) * 9, "binary"),
