@@ -30,8 +30,8 @@ class Road:
     spacing : distance between points, m
     left, right : heights, m, shape (n,), n >= 2
     name : what a chart calls it
-    interpolant : "spline" is C2, for heights that are smooth on the grid; "monotone" is C1 and never
-        leaves the range of the two heights beside X, for heights that may hold kerbs
+    interpolant : "spline" is C2, for heights that are smooth on the grid; "monotone" is C1 and
+        never leaves the range of the two heights beside X, for heights that may hold kerbs
     coefficients : (2, n - 1, 4), C-contiguous; c0 ... c3 of each cell of left and right
 
     Raises RoadError for heights that are not finite or unequal in number.
