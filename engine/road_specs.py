@@ -105,6 +105,15 @@ class IsoRoad:
     def build(self, place: Place, seed: int) -> Road:
         """The road itself; a section that begins beyond the end is left out."""
         begins = [(section.class_, section.begin(place)) for section in self.sections]
+        for section, (_, before), (letter, begin) in zip(
+            self.sections[1:], begins, begins[1:], strict=False
+        ):
+            if section.from_ == TORQUE_END and begin <= before:
+                raise RoadError(
+                    f"The section of class {letter} begins where the drive torque ends, at X ="
+                    f" {begin:.2f} m, but the section before it only begins at {before:.2f} m; let"
+                    " the torque act for longer or give its X in metres."
+                )
         end = max(place.end, begins[0][1] + BLEND_LENGTH)
         roughness = Roughness(
             self.band, self.waviness, self.class_factor, self.coherence, self.decay, self.track

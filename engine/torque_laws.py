@@ -10,6 +10,7 @@ and a deceleration of level b takes brake torques B_i = r_i M (b - fr g) s_i, wi
 brakes' share of the wheel's axle.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 
 from .demand import PiecewiseLinear, rolling_resistance
 from .errors import ManoeuvreError
-from .frames import CORNERS, GRAVITY
+from .frames import CORNERS, CREEP_SPEED, GRAVITY
 from .vehicle import Range, Vehicle
 
 LONGEST = 600.0
@@ -70,7 +71,9 @@ class ReachSpeed:
 
 @dataclass(frozen=True, slots=True)
 class HoldSpeed:
-    """Just the torque that balances rolling resistance, from the beginning to the end."""
+    """Just the torque that balances rolling resistance at the initial speed, from the beginning to
+    the end: T = r M fr g tanh(v/v0) / n, so that a standing car stands.
+    """
 
     kind: ClassVar[str] = "hold-speed"
 
@@ -78,7 +81,7 @@ class HoldSpeed:
         self, vehicle: Vehicle, initial_speed: float, duration: float
     ) -> PiecewiseLinear:
         """Torque on each wheel over time, N m."""
-        full = drive_torque(vehicle, 0.0)
+        full = drive_torque(vehicle, 0.0) * math.tanh(initial_speed / CREEP_SPEED)
         return PiecewiseLinear(np.array([0.0, duration]), np.stack([full, full]))
 
     def end(self) -> None:
@@ -88,7 +91,7 @@ class HoldSpeed:
 
 @dataclass(frozen=True, slots=True)
 class DriveTable:
-    """Total drive torque of all driven wheels at some times, linear between them, then held.
+    """Total drive torque of all driven wheels: none before the first time, then linear, then held.
 
     time : s, not decreasing; a time given twice is a jump
     torque : N m, one for each time
@@ -107,11 +110,14 @@ class DriveTable:
     ) -> PiecewiseLinear:
         """Torque on each wheel over time, N m."""
         share = _driven(vehicle) / len(vehicle.driven_corners)
-        return PiecewiseLinear(np.array(self.time), np.outer(self.torque, share))
+        return _none_before(self.time, np.outer(self.torque, share))
 
     def end(self) -> float | None:
-        """When the torque is gone, s; None where the last one is not zero."""
-        return self.time[-1] if self.torque[-1] == 0.0 else None
+        """When the torque is gone for good, s; None where the last one is not zero."""
+        if self.torque[-1] != 0.0:
+            return None
+        acting = np.flatnonzero(self.torque)
+        return self.time[acting[-1] + 1] if acting.size else 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +152,7 @@ class Deceleration:
 
 @dataclass(frozen=True, slots=True)
 class BrakeTable:
-    """Total brake torque of the four wheels at some times, linear between them.
+    """Total brake torque of the four wheels: none before the first time, then linear, then held.
 
     time : s, not decreasing; a time given twice is a jump
     torque : N m, positive, one for each time
@@ -165,7 +171,7 @@ class BrakeTable:
     def wheel_torque(self, vehicle: Vehicle, duration: float) -> PiecewiseLinear:
         """Brake torque on each wheel over time, N m, not negative."""
         share = brake_shares(vehicle, self.front_share)
-        return PiecewiseLinear(np.array(self.time), np.outer(self.torque, share))
+        return _none_before(self.time, np.outer(self.torque, share))
 
 
 DriveLaw = ReachSpeed | HoldSpeed | DriveTable
@@ -198,6 +204,11 @@ def _check_table(time: tuple[float, ...], torque: tuple[float, ...]) -> None:
         )
     if any(later < earlier for earlier, later in zip(time, time[1:], strict=False)):
         raise ManoeuvreError("time must not decrease; put the knots in order.")
+
+
+def _none_before(time: tuple[float, ...], torque: NDArray) -> PiecewiseLinear:
+    """Torques (k, 4) of a table, which jump from zero at its first time."""
+    return PiecewiseLinear(np.array([time[0], *time]), np.vstack([np.zeros(4), torque]))
 
 
 def _driven(vehicle: Vehicle) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from ridetune.engine.demand import point_mass_motion
-from ridetune.engine.errors import ManoeuvreError
+from ridetune.engine.errors import ManoeuvreError, RoadError
 from ridetune.engine.iso8608 import iso_road
 from ridetune.engine.manoeuvre import (
     manoeuvre_from_json,
@@ -19,6 +19,7 @@ from ridetune.engine.manoeuvre import (
     reference_manoeuvres,
 )
 from ridetune.engine.road import LEFT, RIGHT
+from ridetune.engine.torque_laws import DriveTable
 from ridetune.engine.vehicle import Brakes
 
 from ..factories import paper_vehicle
@@ -185,6 +186,43 @@ def test_constant_speed_is_constant():
     assert_allclose(motion.v, 20.0, rtol=1e-9)
 
 
+@pytest.mark.parametrize("speed", [0.0, 0.05, 0.1, 3.0])
+def test_a_held_speed_is_held_however_slow(speed):
+    """Oracle: T = r M fr g tanh(v/v0)/n cancels rolling resistance at v, so v stays as it is."""
+    slow = replace(reference_manoeuvres()["constant-speed-c"], initial_speed=speed)
+    assert_allclose(motion_of(slow, paper_vehicle()).v, speed, rtol=0, atol=1e-9)
+
+
+def test_a_table_acts_from_its_first_time_on():
+    """Oracle: the words of docs/manoeuvres.md, as one-sided values at the first time."""
+    drive = {"kind": "table", "time": [2, 3], "torque": [400, 600]}
+    brake = {"kind": "table", "time": [4, 5], "torque": [800, 800], "front_share": 0.5}
+    demand = manoeuvre_from_json(
+        {"name": "t", "kind": "road", "duration": 6, "drive": drive, "brake": brake}
+    ).demand(paper_vehicle())
+    assert not demand.drive.at([-1.0, 0.0, 1.99]).any()
+    assert not demand.drive.at(2.0, "left").any()
+    assert_allclose(demand.drive.at([2.0, 2.5, 9.0]).sum(axis=1), [400.0, 500.0, 600.0])
+    assert not demand.brake.at([0.0, 3.99]).any()
+    assert_allclose(demand.brake.at([4.0, 9.0]).sum(axis=1), 800.0)
+
+
+@pytest.mark.parametrize(
+    ("torque", "end"),
+    [
+        ([0, 400, 0, 0, 0], 3.0),
+        ([0, 0, 0, 400, 0], 5.0),
+        ([400, 0, 0, 0, 0], 2.0),
+        ([0, 400, 0, -400, 0], 5.0),
+        ([0, 0, 0, 0, 0], 0.0),
+        ([0, 0, 0, 0, 1], None),
+    ],
+)
+def test_a_table_ends_with_its_last_torque(torque, end):
+    """Oracle: by eye, the first time from which on the torque is zero."""
+    assert DriveTable((1.0, 2.0, 3.0, 4.0, 5.0), tuple(torque)).end() == end
+
+
 def test_tables_of_torque_are_totals_over_the_wheels():
     drive = {"kind": "table", "time": [1, 2, 2, 3], "torque": [0, 400, 100, 0]}
     brake = {"kind": "table", "time": [4, 5], "torque": [0, 800], "front_share": 0.75}
@@ -284,6 +322,16 @@ def test_a_section_at_the_end_of_a_torque_that_never_ends_is_refused():
     with pytest.raises(Exception, match=r"the drive torque never ends; give its X") as caught:
         manoeuvre_from_json(data).demand(paper_vehicle())
     assert caught.value.code == "road"
+
+
+def test_a_torque_that_ends_before_the_road_begins_is_refused():
+    """The car has moved by centimetres when the torque ends; its front contact is at 1.3 m."""
+    brief = changed("drive.time", 0.1, changed("drive.speed", 0.1))
+    sentence = (
+        r"class C begins where the drive torque ends, at X = 0\.\d+ m, but .* at 1\.30 m; let"
+    )
+    with pytest.raises(RoadError, match=sentence):
+        manoeuvre_from_json(brief).demand(paper_vehicle())
 
 
 def test_a_negative_seed_is_refused_wherever_it_comes_from():
