@@ -32,8 +32,8 @@ class Outcome(StrEnum):
         "measure more."
     )
     DOUBTFUL = (
-        "The fit ended, but a channel is probably wrong (its sign, its unit or a dead sensor), so "
-        "nothing is determined; mend it as the warnings say and fit again."
+        "The fit ended, but a channel is probably wrong (its sign, its unit, its column or a dead "
+        "sensor), so nothing is determined; mend it as the warnings say and fit again."
     )
     ASTRAY = (
         "The fit ended further from the measurement than the measurement's own mean; check signs "

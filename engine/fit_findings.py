@@ -139,15 +139,17 @@ def poor_fits(
     observations: Sequence[Observation],
     fitted: Histories,
     faults: Mapping[tuple[str, str], Sequence[str]],
-) -> list[str]:
-    """Channels followed badly for no fault already found."""
-    found = [
-        poor_fit(seen.name, channel, measured, fitted[seen.name][channel], seen.noise[channel])
+) -> dict[tuple[str, str], str]:
+    """By run and channel, a sentence on one followed badly for no fault already found."""
+    found = {
+        (seen.name, channel): poor_fit(
+            seen.name, channel, measured, fitted[seen.name][channel], seen.noise[channel]
+        )
         for seen in observations
         for channel, measured in seen.measured.items()
         if (seen.name, channel) not in faults
-    ]
-    return [sentence for sentence in found if sentence]
+    }
+    return {place: sentence for place, sentence in found.items() if sentence}
 
 
 def bound_findings(estimates: Sequence[ParameterEstimate]) -> list[str]:

@@ -25,6 +25,7 @@ from .problem import FreeParameter, Problem
 from .residuals import FAILED_TRIAL, Residuals, Simulate
 from .simulation import fit_percent, rims_batch
 from .uncertainty import Uncertainty, uncertainty
+from .wheel_order import exchanged_wheels
 
 __all__ = ["Fit", "FreeParameter", "Outcome", "Problem", "Progress", "identify"]
 
@@ -142,7 +143,11 @@ def identify(
     estimates = _estimates(problem, values, errors)
     fitted = residuals.model(solution.x)
     faults = channel_faults(problem.observations, start, fitted)
-    outcome = Outcome.DOUBTFUL if faults else _outcome(solution.status, estimates, search)
+    poor = poor_fits(problem.observations, fitted, faults)
+    suspects = {run for run, _ in (*faults, *poor)}
+    exchanged = exchanged_wheels(residuals, (x_start, solution.x), suspects)
+    wrong = bool(faults or exchanged)
+    outcome = Outcome.DOUBTFUL if wrong else _outcome(solution.status, estimates, search)
     converged = outcome in CONVERGED
     if not converged:
         estimates = tuple(replace(one, determined="no") for one in estimates)
@@ -150,7 +155,8 @@ def identify(
         *(warning for seen in problem.observations for warning in seen.inputs.warnings),
         *moved,
         *(sentence for sentences in faults.values() for sentence in sentences),
-        *poor_fits(problem.observations, fitted, faults),
+        *exchanged.values(),
+        *poor.values(),
         *bound_findings(estimates),
         *(undetermined_findings(estimates, errors) if converged else []),
     ]

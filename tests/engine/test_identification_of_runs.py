@@ -199,6 +199,27 @@ def test_wheels_of_the_wrong_sign_are_suspected(detailed):
 
 
 @pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"fl": "fr", "fr": "fl"}, "wheel.fl.z and wheel.fr.z exchanged"),
+        ({"rl": "rr", "rr": "rl"}, "wheel.rl.z and wheel.rr.z exchanged"),
+        ({"fr": "rl", "rl": "fr"}, "wheel.fr.z and wheel.rl.z exchanged"),
+        ({"fl": "fr", "fr": "fl", "rl": "rr", "rr": "rl"}, "left and right wheels exchanged"),
+        ({"fl": "rl", "fr": "rr", "rl": "fl", "rr": "fr"}, "front and rear wheels exchanged"),
+    ],
+)
+def test_wheels_in_each_other_s_columns_are_named(campaign, given, words):
+    """Oracle: the exchange that was made, from start values off by tens of per cent."""
+    _, run = campaign
+    columns = {f"wheel.{to}.z": run[f"wheel.{of}.z"] for to, of in given.items()}
+    mixed = replace(run, channels={**run.channels, **columns})
+    fit = identify(Problem.build(CAR, [mixed], start=ELSEWHERE), most_evaluations=5)
+    [sentence] = [one for one in fit.warnings if "which column is which wheel" in one]
+    assert words in sentence
+    assert fit.outcome == Outcome.DOUBTFUL
+
+
+@pytest.mark.parametrize(
     ("channel", "factor", "unit"),
     [("chassis.z", 1e3, "mm"), ("chassis.pitch", 57.3, "deg"), ("chassis.roll", 57.3, "deg")],
 )
