@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .fit import ParameterEstimate
-from .problem import Observation
+from .problem import ComparedRun
 from .simulation import fit_percent
 from .uncertainty import Uncertainty
 
@@ -113,11 +113,11 @@ def poor_fit(run: str, channel: str, measured: Array, fitted: Array, noise: floa
 
 
 def channel_faults(
-    observations: Sequence[Observation], start: Histories, fitted: Histories
+    runs: Sequence[ComparedRun], start: Histories, fitted: Histories
 ) -> dict[tuple[str, str], list[str]]:
     """By run and channel, sentences on a sign, unit or sensor that is probably wrong."""
     found: dict[tuple[str, str], list[str]] = {}
-    for seen in observations:
+    for seen in runs:
         opposed = []
         for channel, measured in seen.measured.items():
             before, after = start[seen.name][channel], fitted[seen.name][channel]
@@ -136,7 +136,7 @@ def channel_faults(
 
 
 def poor_fits(
-    observations: Sequence[Observation],
+    runs: Sequence[ComparedRun],
     fitted: Histories,
     faults: Mapping[tuple[str, str], Sequence[str]],
 ) -> dict[tuple[str, str], str]:
@@ -145,7 +145,7 @@ def poor_fits(
         (seen.name, channel): poor_fit(
             seen.name, channel, measured, fitted[seen.name][channel], seen.noise[channel]
         )
-        for seen in observations
+        for seen in runs
         for channel, measured in seen.measured.items()
         if (seen.name, channel) not in faults
     }

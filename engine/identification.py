@@ -119,7 +119,7 @@ def identify(
     )
     x_start, moved = _usable_start(residuals, x_start)
     start = residuals.model(x_start)
-    at_start = channel_faults(problem.observations, start, start)
+    at_start = channel_faults(problem.runs, start, start)
 
     search = _Search(residuals, progress)
     solution = least_squares(
@@ -142,8 +142,8 @@ def identify(
     values = problem.values(solution.x)
     estimates = _estimates(problem, values, errors)
     fitted = residuals.model(solution.x)
-    faults = channel_faults(problem.observations, start, fitted)
-    poor = poor_fits(problem.observations, fitted, faults)
+    faults = channel_faults(problem.runs, start, fitted)
+    poor = poor_fits(problem.runs, fitted, faults)
     suspects = {run for run, _ in (*faults, *poor)}
     exchanged = exchanged_wheels(residuals, (x_start, solution.x), suspects)
     wrong = bool(faults or exchanged)
@@ -152,7 +152,7 @@ def identify(
     if not converged:
         estimates = tuple(replace(one, determined="no") for one in estimates)
     warnings = [
-        *(warning for seen in problem.observations for warning in seen.inputs.warnings),
+        *(warning for seen in problem.runs for warning in seen.inputs.warnings),
         *moved,
         *(sentence for sentences in faults.values() for sentence in sentences),
         *exchanged.values(),
@@ -178,7 +178,7 @@ def identify(
         settings=problem.settings,
         runs=tuple(
             FittedRun(seen.name, len(seen.inputs.time), dict(seen.noise), seen.inputs.braking)
-            for seen in problem.observations
+            for seen in problem.runs
         ),
     )
 
@@ -198,7 +198,7 @@ def _usable_start(residuals: Residuals, x: Array) -> tuple[Array, list[str]]:
         return x, []
     if not failed:
         start = residuals.model(x)
-        if channel_faults(residuals.problem.observations, start, start):
+        if channel_faults(residuals.problem.runs, start, start):
             return x, []
     reach = np.where([one.logarithmic for one in residuals.problem.free], 1.0, 2.0)
     lower = np.maximum(residuals.lower, x - reach)
@@ -221,7 +221,7 @@ def _failure(problem: Problem) -> str:
     """Why the model may fail on the runs wherever the fit could start."""
     furthest = {
         f"{channel} of run {seen.name}": np.max(np.abs(seen.inputs.stage_inputs[:, 0, corner]))
-        for seen in problem.observations
+        for seen in problem.runs
         for corner, channel in enumerate(WHEEL_CHANNELS)
     }
     place = max(furthest, key=lambda name: furthest[name])

@@ -68,7 +68,7 @@ class FreeParameter:
 
 
 @dataclass(frozen=True, slots=True)
-class Observation:
+class ComparedRun:
     """One run as the fit compares it.
 
     measured : channel -> (samples,) through the output filter
@@ -86,7 +86,7 @@ class Problem:
     """A checked identification problem; `vehicle` carries the start values."""
 
     vehicle: Vehicle
-    observations: tuple[Observation, ...]
+    runs: tuple[ComparedRun, ...]
     free: tuple[FreeParameter, ...]
     traction: Traction
     settings: RimsSettings
@@ -127,16 +127,16 @@ class Problem:
         names = _free_names(free, fixed)
         limits = {parameter(name).name: limit for name, limit in (bounds or {}).items()}
         parameters = tuple(_free_parameter(vehicle, name, limits.get(name)) for name in names)
-        observations = _observations(vehicle, runs, noise or {}, outputs, settings)
-        samples = sum(len(measured) for seen in observations for measured in seen.measured.values())
+        compared = _compared_runs(vehicle, runs, noise or {}, outputs, settings)
+        samples = sum(len(measured) for seen in compared for measured in seen.measured.values())
         if samples <= len(parameters):
             raise ProblemError(
                 f"{samples} samples cannot determine {len(parameters)} parameters; free fewer "
                 "or measure longer."
             )
-        if not any(map(_moves, observations)):
-            raise ProblemError(_at_rest(observations))
-        return cls(vehicle, observations, parameters, traction, settings)
+        if not any(map(_moves, compared)):
+            raise ProblemError(_at_rest(compared))
+        return cls(vehicle, compared, parameters, traction, settings)
 
     def values(self, x: Array) -> Array:
         """The free parameters at the optimiser's variables x."""
@@ -204,13 +204,13 @@ def _free_parameter(
     return FreeParameter(name, start, lower, upper)
 
 
-def _observations(
+def _compared_runs(
     vehicle: Vehicle,
     runs: Sequence[Run],
     noise: Mapping[str, float],
     outputs: Sequence[str] | Mapping[str, Sequence[str]] | None,
     settings: RimsSettings,
-) -> tuple[Observation, ...]:
+) -> tuple[ComparedRun, ...]:
     if not runs:
         raise ProblemError("No run is given; give at least one recording.")
     names = _distinct_names(runs)
@@ -247,7 +247,7 @@ def _observations(
                 )
         stated = {**DEFAULT_NOISE, **run.noise, **noise}
         found.append(
-            Observation(
+            ComparedRun(
                 name,
                 prepare(run, vehicle, settings),
                 compared,
@@ -257,19 +257,19 @@ def _observations(
     return tuple(found)
 
 
-def _moves(seen: Observation) -> bool:
+def _moves(seen: ComparedRun) -> bool:
     return any(
         float(np.std(values)) > MOVES * seen.noise[channel]
         for channel, values in seen.measured.items()
     )
 
 
-def _at_rest(observations: Sequence[Observation]) -> str:
-    names = [seen.name for seen in observations]
-    runs = f"run {names[0]}" if len(names) == 1 else f"runs {', '.join(names)}"
-    channels = dict.fromkeys(name for seen in observations for name in seen.measured)
+def _at_rest(runs: Sequence[ComparedRun]) -> str:
+    names = [seen.name for seen in runs]
+    which = f"run {names[0]}" if len(names) == 1 else f"runs {', '.join(names)}"
+    channels = dict.fromkeys(name for seen in runs for name in seen.measured)
     return (
-        f"Nothing can be learnt from {runs}: {', '.join(channels)} "
+        f"Nothing can be learnt from {which}: {', '.join(channels)} "
         f"{'stays within its' if len(channels) == 1 else 'stay within their'} noise; give a run "
         "in which the car moves, or state the noise if it is smaller."
     )

@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from .channels import OUTPUT_CHANNELS
 from .errors import Cancelled
 from .filters import smoothed
+from .kernels.lanes import BATCH
 from .problem import Problem
 from .rims import RimsInputs
 from .simulation import Traction
@@ -47,7 +48,7 @@ FAILED_TRIAL = 1e8
 CAR_STEPS_AT_ONCE = 400_000
 """Cars times steps in one batch: 16 numbers each, about 50 MB."""
 
-LANES = 8
+LANES = len(BATCH)
 """Cars the simulation works on side by side; a batch is cut at multiples of it."""
 
 RUNS_AT_ONCE = 2
@@ -94,7 +95,7 @@ class Residuals:
     def blocks(self) -> list[Block]:
         """The blocks of the residual vector, in order."""
         found, begin = [], 0
-        for seen in self.problem.observations:
+        for seen in self.problem.runs:
             for channel, measured in seen.measured.items():
                 place = slice(begin, begin + len(measured))
                 found.append(Block(seen.name, channel, place, measured, seen.noise[channel]))
@@ -165,9 +166,7 @@ class Residuals:
         """Residuals of many cars, (cars, samples of all blocks); a failed car is not a number."""
         vehicles = [self.problem.vehicle_at(x) for x in trials]
         rows = []
-        for seen, histories in zip(
-            self.problem.observations, self._histories(vehicles), strict=True
-        ):
+        for seen, histories in zip(self.problem.runs, self._histories(vehicles), strict=True):
             filtered = self._filtered(seen.inputs.time, histories)
             for channel, measured in seen.measured.items():
                 model = filtered[:, :, OUTPUT_CHANNELS.index(channel)]
@@ -185,7 +184,7 @@ class Residuals:
                     pool.submit(self._simulate, some, seen.inputs, self.problem.traction)
                     for some in _parts(vehicles, len(seen.inputs.node_time))
                 ]
-                for seen in self.problem.observations
+                for seen in self.problem.runs
             ]
             pending = {future for run in parts for future in run}
             while pending:

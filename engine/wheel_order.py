@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .channels import WHEEL_CHANNELS
-from .problem import Observation
+from .problem import ComparedRun
 from .residuals import Residuals
 from .simulation import fit_percent
 
@@ -52,7 +52,7 @@ def exchanged_wheels(
     runs : names of the runs to look at
     """
     problem = residuals.problem
-    seen = tuple(one for one in problem.observations if one.name in runs)
+    seen = tuple(one for one in problem.runs if one.name in runs)
     if not seen:
         return {}
     best: dict[str, tuple[float, str]] = {}
@@ -60,7 +60,7 @@ def exchanged_wheels(
         as_given = residuals.model(x)
         for words, order in ORDERS.items():
             exchanged = tuple(_exchanged(one, order) for one in seen)
-            trial = residuals.on(replace(problem, observations=exchanged), x)
+            trial = residuals.on(replace(problem, runs=exchanged), x)
             for one in seen:
                 ratio = _misfit_ratio(one, as_given[one.name], trial[one.name])
                 if ratio < CLEARLY * best.get(one.name, (1.0 / CLEARLY, ""))[0]:
@@ -68,7 +68,7 @@ def exchanged_wheels(
     return {run: sentence for run, (_, sentence) in best.items()}
 
 
-def _exchanged(seen: Observation, order: Sequence[int]) -> Observation:
+def _exchanged(seen: ComparedRun, order: Sequence[int]) -> ComparedRun:
     """The run with u, u' and u'' of the wheels in another order."""
     stages = seen.inputs.stage_inputs.copy()
     for first in (0, 4, 8):
@@ -77,7 +77,7 @@ def _exchanged(seen: Observation, order: Sequence[int]) -> Observation:
 
 
 def _misfit_ratio(
-    seen: Observation, given: Mapping[str, Array], trial: Mapping[str, Array]
+    seen: ComparedRun, given: Mapping[str, Array], trial: Mapping[str, Array]
 ) -> float:
     """Mean over channels of squared misfit after over before; infinite where not much better."""
     before, after = (
@@ -91,7 +91,7 @@ def _misfit_ratio(
     return float(np.mean(ratios))
 
 
-def _sentence(seen: Observation, words: str, given: Histories, trial: Histories) -> str:
+def _sentence(seen: ComparedRun, words: str, given: Histories, trial: Histories) -> str:
     gains = []
     for channel, measured in seen.measured.items():
         before, after = (fit_percent(measured, one[seen.name][channel]) for one in (given, trial))

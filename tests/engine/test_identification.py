@@ -44,10 +44,10 @@ def test_estimates_and_errors_are_those_of_linear_least_squares():
     run = stand_in.recording(CAR, seed=3)
     found = fit([run])
     problem = Problem.build(CAR, [run])
-    noise = np.concatenate([np.full(1001, v) for v in problem.observations[0].noise.values()])
+    noise = np.concatenate([np.full(1001, v) for v in problem.runs[0].noise.values()])
     columns = np.concatenate(list(stand_in.basis(run.time).transpose(1, 0, 2)))
     basis = columns[:, :-1] / noise[:, np.newaxis]
-    measured = np.concatenate(list(problem.observations[0].measured.values()))
+    measured = np.concatenate(list(problem.runs[0].measured.values()))
     solved, *_ = np.linalg.lstsq(basis, (measured - columns[:, -1]) / noise, rcond=None)
     assert_allclose(stand_in.weights(found.vehicle)[:-1], solved, rtol=0, atol=1e-6)
     errors = np.sqrt(np.diag(np.linalg.inv(basis.T @ basis)))

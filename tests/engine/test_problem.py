@@ -32,7 +32,7 @@ def test_without_further_words_all_twelve_are_free_between_default_bounds():
     problem = Problem.build(CAR, [recording()])
     assert tuple(one.name for one in problem.free) == PARAMETER_NAMES
     assert problem.free[0] == FreeParameter(SPRING, 24000.0, 0.05 * 24000.0, 8.0 * 24000.0)
-    assert problem.observations[0].noise == DEFAULT_NOISE
+    assert problem.runs[0].noise == DEFAULT_NOISE
 
 
 def test_free_and_fixed_take_names_and_symbols():
@@ -51,7 +51,7 @@ def test_start_values_become_the_car():
 def test_a_caller_s_noise_goes_before_the_run_s_and_that_before_the_default():
     run = recording(noise={"chassis.z": 2e-3, "chassis.roll": 1e-3})
     problem = Problem.build(CAR, [run], noise={"chassis.z": 3e-3})
-    assert problem.observations[0].noise == {
+    assert problem.runs[0].noise == {
         "chassis.z": 3e-3,
         "chassis.pitch": DEFAULT_NOISE["chassis.pitch"],
         "chassis.roll": 1e-3,
@@ -61,11 +61,9 @@ def test_a_caller_s_noise_goes_before_the_run_s_and_that_before_the_default():
 def test_channels_compared_can_be_chosen_for_all_runs_or_by_run():
     runs = [recording("a"), recording("b", seed=1)]
     everywhere = Problem.build(CAR, runs, outputs=["chassis.roll", "chassis.z"])
-    assert [list(seen.measured) for seen in everywhere.observations] == [
-        ["chassis.z", "chassis.roll"]
-    ] * 2
+    assert [list(seen.measured) for seen in everywhere.runs] == [["chassis.z", "chassis.roll"]] * 2
     by_run = Problem.build(CAR, runs, outputs={"b": ["chassis.pitch"]})
-    assert [list(seen.measured) for seen in by_run.observations] == [
+    assert [list(seen.measured) for seen in by_run.runs] == [
         list(OUTPUT_CHANNELS),
         ["chassis.pitch"],
     ]
@@ -73,12 +71,12 @@ def test_channels_compared_can_be_chosen_for_all_runs_or_by_run():
 
 def test_runs_may_lack_output_channels():
     problem = Problem.build(CAR, [recording("a", ["chassis.z"]), recording("b", seed=1)])
-    assert list(problem.observations[0].measured) == ["chassis.z"]
+    assert list(problem.runs[0].measured) == ["chassis.z"]
 
 
 def test_two_recordings_of_one_name_are_told_apart():
     problem = Problem.build(CAR, [recording(seed=0), recording(seed=1)])
-    assert [seen.name for seen in problem.observations] == ["lap", "lap (2)"]
+    assert [seen.name for seen in problem.runs] == ["lap", "lap (2)"]
 
 
 @pytest.mark.parametrize(
