@@ -207,7 +207,9 @@ def _check_table(time: tuple[float, ...], torque: tuple[float, ...]) -> None:
 
 
 def _none_before(time: tuple[float, ...], torque: NDArray) -> PiecewiseLinear:
-    """Torques (k, 4) of a table, which jump from zero at its first time."""
+    """Torques (k, 4) of a table; one that begins later than the manoeuvre jumps from zero there."""
+    if time[0] == 0.0:
+        return PiecewiseLinear(np.array(time), torque)
     return PiecewiseLinear(np.array([time[0], *time]), np.vstack([np.zeros(4), torque]))
 
 

@@ -205,6 +205,8 @@ def test_a_table_acts_from_its_first_time_on():
     assert_allclose(demand.drive.at([2.0, 2.5, 9.0]).sum(axis=1), [400.0, 500.0, 600.0])
     assert not demand.brake.at([0.0, 3.99]).any()
     assert_allclose(demand.brake.at([4.0, 9.0]).sum(axis=1), 800.0)
+    at_once = DriveTable((0.0, 1.0), (400.0, 400.0)).wheel_torque(paper_vehicle(), 0.0, 6.0)
+    assert_allclose(at_once.at(0.0, "left").sum(), 400.0)
 
 
 @pytest.mark.parametrize(
