@@ -16,6 +16,7 @@ The moment of the pivot's own vertical force vanishes, whatever the sign of `d`.
 
 from dataclasses import dataclass
 
+from .errors import VehicleError
 from .frames import AXLES, CORNERS, GRAVITY, AxleName, Corner, axle_of
 from .vehicle import Vehicle
 
@@ -35,7 +36,10 @@ class StaticLoads:
 
 
 def static_loads(vehicle: Vehicle) -> StaticLoads:
-    """Axle loads, tyre loads and spring preloads in the design position."""
+    """Axle loads, tyre loads and spring preloads in the design position.
+
+    Raises VehicleError where an axle would lift off at rest or its springs would have to pull.
+    """
     front, rear, wheelbase = vehicle.front, vehicle.rear, vehicle.wheelbase
     front_share = (
         vehicle.chassis.mass * rear.cg_distance
@@ -50,6 +54,18 @@ def static_loads(vehicle: Vehicle) -> StaticLoads:
     preload: dict[AxleName, float] = {
         name: 0.5 * axle_load[name] - _carried_by_wheel(vehicle, name) for name in AXLES
     }
+    for name in AXLES:
+        if axle_load[name] <= 0.0:
+            raise VehicleError(
+                f"At rest the {name} wheels would have to pull on the ground with"
+                f" {-axle_load[name]:.4g} N; correct the axles' cg_distance or wheel.cg_offset."
+            )
+        if preload[name] <= 0.0:
+            raise VehicleError(
+                f"At rest each {name} spring would have to pull with {-preload[name]:.4g} N, for"
+                f" the wheel's own weight acts behind its arm; correct {name}.wheel.cg_offset,"
+                f" {name}.wheel.mass or {name}.pivot.distance."
+            )
     return StaticLoads(
         axle_load=axle_load,
         tyre_load={corner: 0.5 * axle_load[axle_of(corner)] for corner in CORNERS},

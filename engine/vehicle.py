@@ -45,6 +45,9 @@ class Range:
 PIVOT_CLEARANCE = 0.1
 """Least longitudinal distance between a pivot and its wheel's contact point, m."""
 
+STEEPEST_ARM = 0.1
+"""Least share of an arm's length that lies along the car: steeper, its wheel can barely rise."""
+
 Mass = Annotated[float, Range("kg", 0.1, 1e5)]
 MomentOfInertia = Annotated[float, Range("kg m^2", 0.0, 1e6)]
 LinearDamping = Annotated[float, Range("N s/m", 0.0, 1e6)]
@@ -291,11 +294,27 @@ def check(vehicle: Vehicle, source: str = "vehicle") -> None:
         f"{source}: chassis.inertia", *_principal_moments(inertia), crossed=inertia.xz != 0.0
     )
     for name in AXLES:
-        moments = vehicle.axle(name).wheel.inertia
+        axle = vehicle.axle(name)
+        moments = axle.wheel.inertia
         _check_inertia(f"{source}: {name}.wheel.inertia", moments.xx, moments.yy, moments.zz)
+        _check_arm(f"{source}: {name}.pivot", axle)
     if not vehicle.driven_corners:
         raise VehicleError(
             f"{source}: front.driven and rear.driven are both false; set one of them to true."
+        )
+
+
+def _check_arm(place: str, axle: Axle) -> None:
+    """Refuse an arm so near the vertical that it cannot carry its wheel up and down."""
+    pivot = axle.pivot
+    height = pivot.distance * math.tan(pivot.angle)
+    along, up = abs(pivot.distance), abs(height - axle.wheel.radius)
+    if along < STEEPEST_ARM * math.hypot(along, up):
+        raise VehicleError(
+            f"{place} lies {along:.3g} m from the wheel along the car at a height of {height:.3g}"
+            f" m, so that the arm stands {math.degrees(math.atan2(along, up)):.2g} deg from the"
+            " vertical and cannot carry the wheel up and down; lengthen pivot.distance or bring"
+            " pivot.angle nearer to zero."
         )
 
 

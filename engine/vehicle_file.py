@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from .equilibrium import static_loads
 from .errors import VehicleError
 from .json_record import RecordReader, record_to_json
 from .json_text import parse_json, read_json
@@ -39,6 +40,10 @@ def vehicle_from_json(data: Any, source: str = "vehicle") -> Vehicle:
         data, place = data["vehicle"], "vehicle"
     vehicle = RecordReader(source, VehicleError).record(Vehicle, data, place)
     check(vehicle, source)
+    try:
+        static_loads(vehicle)
+    except VehicleError as error:
+        raise VehicleError(f"{source}: {error}") from error
     return vehicle
 
 

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import pytest
 from ridetune.engine.equilibrium import static_loads
+from ridetune.engine.errors import VehicleError
 from ridetune.engine.frames import AXLES, CORNERS, GRAVITY
-from ridetune.engine.vehicle_file import reference_vehicles
+from ridetune.engine.vehicle_file import reference_vehicles, vehicle_from_json, vehicle_to_json
 
 ROUNDING = 1e-9
 """N or N m; the car's weight is 1e4 N, so this is 1e-13 of it."""
@@ -91,3 +92,40 @@ def test_springs_and_pivots_carry_the_sprung_mass(car):
         moment += spring * centre + hinge * pivot
     assert force == pytest.approx(car.chassis.mass * GRAVITY, abs=ROUNDING)
     assert moment == pytest.approx(0.0, abs=ROUNDING)
+
+
+def with_front_offset(data, offset, distance):
+    data["front"]["wheel"]["cg_offset"] = [offset, 0.0, 0.0]
+    data["front"]["pivot"]["distance"] = distance
+    return data
+
+
+@pytest.mark.parametrize(("offset", "distance", "stands"), [(-1.0, 0.1, False), (-1.0, 1.0, True)])
+def test_a_car_whose_springs_would_have_to_pull_is_refused(offset, distance, stands):
+    """Oracle: moments about the pivot, F0 d = W0 d - m g (d - c), with the whole car's W0.
+
+    36 kg hang 1 m ahead of the wheel: their moment 353 N (d + 1 m) against W0 d, W0 = 3.2 kN.
+    """
+    data = with_front_offset(
+        vehicle_to_json(reference_vehicles()["paper"]), offset=offset, distance=distance
+    )
+    wheelbase, weight = 2.66, 36.0 * GRAVITY
+    load = (1090.0 * GRAVITY * 1.36 + 2 * weight * (wheelbase - offset)) / (2 * wheelbase)
+    spring = load - weight * (1.0 - offset / distance)
+    assert (spring > 0.0) is stands
+    if stands:
+        loads = static_loads(vehicle_from_json(data))
+        assert loads.preload["fl"] == pytest.approx(spring, rel=1e-9)
+    else:
+        sentence = rf"^v\.json: At rest each front spring would have to pull with {-spring:.4g} N"
+        with pytest.raises(VehicleError, match=sentence):
+            vehicle_from_json(data, "v.json")
+
+
+def test_a_car_that_would_tip_at_rest_is_refused():
+    """Oracle: the lever rule; the rear axle so near the CG that offsets take its load away."""
+    data = vehicle_to_json(reference_vehicles()["paper"])
+    data["front"]["cg_distance"], data["front"]["wheel"]["cg_offset"] = 0.05, [-1.0, 0.0, 0.0]
+    data["front"]["wheel"]["mass"] = 200.0
+    with pytest.raises(VehicleError, match=r"rear wheels would have to pull on the ground"):
+        vehicle_from_json(data)

@@ -101,6 +101,27 @@ def test_the_pivot_may_be_on_either_side_of_the_wheel(car, distance):
 
 
 @pytest.mark.parametrize(
+    ("distance", "angle", "degrees"),
+    [(1.6, 1.5, "4.1"), (0.1, 1.5, "5.1"), (-1.6, 1.5, "4"), (-0.2, -1.49, "5.3")],
+)
+def test_an_arm_that_stands_upright_is_refused(car, distance, angle, degrees):
+    """Oracle: atan(|d| / |d tan(phi) - r|) by hand; 5.74 deg is a tenth of the length."""
+    pivot = {"front.pivot.distance": distance, "front.pivot.angle": angle}
+    with pytest.raises(VehicleError, match=rf"front\.pivot lies .* {degrees} deg .*lengthen"):
+        car.with_values(pivot)
+
+
+@pytest.mark.parametrize(
+    ("distance", "angle"), [(0.1, -0.3), (0.1, 1.3), (10.0, 1.3), (-10.0, 1.3)]
+)
+def test_a_virtual_pivot_may_lie_underground_or_far_above(car, distance, angle):
+    """The corners of a fit's default bounds: the pivot is the centre of a motion, not a part."""
+    for axle in ("front", "rear"):
+        values = {f"{axle}.pivot.distance": distance, f"{axle}.pivot.angle": angle}
+        assert car.with_values(values).axle(axle).pivot.distance == distance
+
+
+@pytest.mark.parametrize(
     "moments",
     [
         {"chassis.inertia.xx": 100.0},  # 100 + 1550 < 1700
