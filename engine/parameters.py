@@ -10,6 +10,7 @@ from difflib import get_close_matches
 
 from .errors import ParameterError
 from .frames import AxleName
+from .vehicle import numbers
 
 SHARE_OF_START = (0.05, 8.0)
 """Default bounds of a stiffness or damping, as multiples of its start value."""
@@ -160,9 +161,16 @@ def default_bounds(name: str, start: float) -> tuple[float, float]:
     """Lower and upper bound of a free parameter that starts at `start`.
 
     Stiffness and damping: 0.05 to 8 times the start, which must be positive. Pivot angle: -0.3 to
-    1.3 rad. Pivot distance: 0.1 to 10 m with the sign of the start.
+    1.3 rad. Pivot distance: 0.1 to 10 m with the sign of the start. All of it within what a vehicle
+    accepts.
     """
     row = parameter(name)
+    accepted = numbers()[row.name]
+    lower, upper = _wished_bounds(row, start)
+    return max(lower, accepted.lower), min(upper, accepted.upper)
+
+
+def _wished_bounds(row: Parameter, start: float) -> tuple[float, float]:
     if row.name.endswith("pivot.angle"):
         return ANGLE_BOUNDS
     lower, upper = DISTANCE_BOUNDS

@@ -39,10 +39,21 @@ class TestEveryParameter:
     def test_its_slider_has_steps_a_hand_can_use(self, row):
         assert 50 <= (row.slider_upper - row.slider_lower) / row.step <= 2500
 
-    def test_its_default_bounds_hold_the_start(self, row):
-        start = reference_vehicles()["paper"].value(row.name)
-        lower, upper = default_bounds(row.name, start)
-        assert lower < start < upper
+    def test_its_default_bounds_hold_the_start_of_every_reference_car(self, row):
+        cars = [car for car in reference_vehicles().values() if car.value(row.name) != 0.0]
+        for car in cars:
+            start = car.value(row.name)
+            lower, upper = default_bounds(row.name, start)
+            assert lower < start < upper
+            for bound in (lower, upper):
+                assert car.with_values({row.name: bound}).value(row.name) == bound
+
+    def test_its_default_bounds_stay_where_the_vehicle_is_accepted(self, row):
+        accepted = numbers()[row.name]
+        for start in (max(accepted.lower, 1e-3), accepted.upper):
+            lower, upper = default_bounds(row.name, start)
+            assert accepted.holds(lower)
+            assert accepted.holds(upper)
 
     def test_it_is_found_by_name_and_by_symbol_in_any_case(self, row):
         assert parameter(row.name) is parameter(row.symbol) is row
