@@ -99,6 +99,25 @@ class CsvTable:
             raise self._bad_cell(columns, *self._row(int(np.argmin(finite)), columns))
         return table
 
+    def in_si(self, columns: Sequence[tuple[int, float, float]]) -> NDArray[np.float64]:
+        """Numbers (samples, len(columns)) as factor * number + offset, all finite.
+
+        columns : index, factor and offset of each
+        """
+        indices, factors, offsets = zip(*columns, strict=True)
+        table = self.numbers(indices)
+        with np.errstate(over="ignore"):
+            table *= factors
+            table += offsets
+        finite = np.isfinite(table)
+        if not finite.all():
+            row, column = divmod(int(np.argmin(finite)), len(columns))
+            line, text = self._row(row, indices)
+            cell = text.split(self._delimiter)[indices[column]]
+            remedy = "correct it or the column's unit"
+            raise self._bad_number(line, indices[column], cell, remedy, "too large")
+        return table
+
     def line_of(self, row: int) -> int:
         """The line of the file, counted from 1, that holds a row of `numbers`, counted from 0."""
         return self._row(row, [])[0]

@@ -27,7 +27,7 @@ from .channels import (
 )
 from .csv_table import LARGEST_FILE, CsvTable, is_number, split_title
 from .errors import MeasurementError
-from .run_notes import RunNotes, checked_noise, read_notes
+from .run_notes import RunNotes, checked_noise, doubtful_noise, read_notes
 from .units import UnitError, to_si
 
 FEWEST_SAMPLES = 10
@@ -71,7 +71,7 @@ def parse_run(data: bytes, name: str, *, noise: Mapping[str, float] | None = Non
 
 
 def write_run(run: Run, path: str | Path) -> None:
-    """Write a run as CSV in SI; `read_run` returns its values to 11 digits."""
+    """Write a run as CSV in SI; `read_run` returns its values to 11 digits, its time to 14."""
     Path(path).write_text(run_to_csv(run), encoding="utf-8", newline="\n")
 
 
@@ -79,7 +79,8 @@ def run_to_csv(run: Run) -> str:
     """A run as CSV text in SI, one row a sample, columns in the table's order."""
     titles = [f"{name} [{channel(name).unit}]" for name in ("time", *run.columns)]
     table = np.column_stack([run.time, *(run[name] for name in run.columns)])
-    row = ",".join(["%.12g"] * len(titles))
+    # A time counted from 1970 in seconds takes ten digits before the point.
+    row = ",".join(["%.15g"] + ["%.12g"] * len(run.columns))
     return "\n".join([",".join(titles), *(row % tuple(values) for values in table.tolist()), ""])
 
 
@@ -100,22 +101,21 @@ def _run(stream: BinaryIO, source: str, noise: Mapping[str, float], description:
         )
     table = CsvTable(stream, source)
     columns, warnings = _columns(table.header, source)
-    numbers = table.numbers([column.index for column in columns])
+    numbers = table.in_si([(column.index, column.factor, column.offset) for column in columns])
     if len(numbers) < FEWEST_SAMPLES:
         raise MeasurementError(
             f"{source}: the file holds {len(numbers)} samples, at least {FEWEST_SAMPLES} are"
             " needed; record longer or sample faster."
         )
-    values = {
-        column.info.name: column.factor * numbers[:, position] + column.offset
-        for position, column in enumerate(columns)
-    }
+    values = {column.info.name: numbers[:, k] for k, column in enumerate(columns)}
     time = values.pop("time")
     _require_increasing(time, table, source)
     warnings += _doubtful_time(time)
     for column in columns[1:]:
         warnings += _doubtful_magnitude(column, values[column.info.name])
-    return Run(source, time, values, checked_noise(noise, source), tuple(warnings), description)
+    known = checked_noise(noise, source)
+    warnings += doubtful_noise(known, values)
+    return Run(source, time, values, known, tuple(warnings), description)
 
 
 def _columns(header: list[str], source: str) -> tuple[list[_Column], list[str]]:

@@ -76,10 +76,9 @@ def _road(stream: BinaryIO, source: str) -> Road:
     try:
         table = CsvTable(stream, source)
         columns = _columns(table.header, source)
-        numbers = table.numbers([index for index, _ in columns])
+        x, left, right = table.in_si([(index, factor, 0.0) for index, factor in columns]).T
     except MeasurementError as error:
         raise RoadError(str(error)) from error
-    x, left, right = (factor * numbers[:, i] for i, (_, factor) in enumerate(columns))
     if x.size < FEWEST_POINTS:
         raise RoadError(
             f"{source}: the file holds {x.size} points, at least {FEWEST_POINTS} are needed; give"

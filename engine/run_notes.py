@@ -16,11 +16,21 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from .channels import channel
 from .errors import MeasurementError
 
 LARGEST_FILE = 1_000_000
 """Longest file of notes that is read, bytes."""
+
+
+LOUDEST = 3
+"""Multiple of a channel's standard deviation beyond which a stated noise is doubtful ..."""
+
+SHARE_OF_LARGEST = 0.01
+"""... if it also exceeds this share of the greatest value of a real recording."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +88,27 @@ def checked_noise(noise: Mapping[str, Any], source: str) -> dict[str, float]:
                 f"{source}: noise of {name} is {value!r}; give a positive number in {info.unit}."
             )
     return {name: float(value) for name, value in noise.items()}
+
+
+def doubtful_noise(
+    noise: Mapping[str, float], values: Mapping[str, NDArray[np.float64]]
+) -> list[str]:
+    """A warning for each noise that is so large that its channel would count for nothing.
+
+    noise : standard deviations by channel;  values : the recording's own, both in SI
+    """
+    warnings = []
+    for name in sorted(noise.keys() & values.keys()):
+        info, scatter = channel(name), float(np.std(values[name]))
+        if noise[name] > max(LOUDEST * scatter, SHARE_OF_LARGEST * info.largest):
+            other = info.display_unit != info.unit
+            doubt = f"is this one in {info.display_unit}?" if other else "check the number."
+            warnings.append(
+                f"The stated noise of {name}, {noise[name]:g} {info.unit}, is more than {LOUDEST}"
+                f" times all its variation ({scatter:.3g} {info.unit}), so that {name} counts for"
+                f" nothing; noise is stated in {info.unit}, {doubt}"
+            )
+    return warnings
 
 
 def _flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

@@ -124,6 +124,29 @@ def test_notes_beside_the_file_state_noise_and_description(tmp_path):
     assert run.noise == {"chassis.z": 2e-3, "chassis.roll": 1e-4}
 
 
+def test_times_counted_from_1970_keep_their_milliseconds():
+    """Oracle: the samples themselves, 1 ms apart at 1.7e9 s; doubles are 2.4e-7 s apart there."""
+    time = 1.7e9 + 0.001 * np.arange(SAMPLES)
+    run = parse_run(run_to_csv(Run("r", time, {"chassis.z": 0.01 * WAVE})).encode(), "run.csv")
+    np.testing.assert_allclose(run.time, time, rtol=0, atol=1e-5)
+
+
+def test_a_number_too_large_for_si_is_named_with_its_cell():
+    values = 0.01 * WAVE
+    values[3] = 1e307
+    message = refusal({"time [s]": TIME, "chassis.z [km]": values})
+    assert "line 5, column chassis.z [km]: '1e+307' is too large; correct it" in message
+
+
+def test_a_stated_noise_in_the_wrong_unit_is_doubted():
+    """0.5 was meant in mm."""
+    [warning] = parse(
+        small("chassis.z [m]", "chassis.a_x [m/s^2]"), noise={"chassis.z": 0.5}
+    ).warnings
+    assert "noise of chassis.z, 0.5 m," in warning
+    assert "is this one in mm?" in warning
+
+
 def test_stated_noise_must_be_positive():
     with pytest.raises(MeasurementError, match=r"run\.csv: noise of chassis\.z is 0"):
         parse(small("chassis.z [m]"), noise={"chassis.z": 0})

@@ -111,6 +111,10 @@ def test_elevation_above_the_sea_counts_from_the_beginning_and_keeps_the_cross_s
         ),
         (HEAD.encode() + b"0,0,0\n1e9,0,0\n2e9,0,0\n", "2e\\+09 m long, more than 100000 m"),
         (HEAD.encode() + b"0,0,0\n1e-7,0,0\n9e4,0,0\n", "thin out the closest points"),
+        (
+            b"x [km],left [m],right [m]\n0,0,0\n1e307,0,0\n2,0,0\n",
+            r"line 3, column x \[km\]: '1e307' is too large; correct it or the column's unit",
+        ),
         (bytes(range(256)) * 9, "binary"),
     ],
 )

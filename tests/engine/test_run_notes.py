@@ -1,6 +1,15 @@
+import math
+
+import numpy as np
 import pytest
 from ridetune.engine.errors import MeasurementError
-from ridetune.engine.run_notes import LARGEST_FILE, checked_noise, parse_notes, read_notes
+from ridetune.engine.run_notes import (
+    LARGEST_FILE,
+    checked_noise,
+    doubtful_noise,
+    parse_notes,
+    read_notes,
+)
 
 
 def test_notes_state_noise_and_description():
@@ -49,6 +58,31 @@ def test_a_fault_in_the_notes_is_named(text, message):
 def test_notes_that_are_not_there_are_named(tmp_path):
     with pytest.raises(MeasurementError, match=r"r\.toml: cannot be read"):
         read_notes(tmp_path / "r.toml")
+
+
+@pytest.mark.parametrize(
+    ("name", "stated", "doubted"),
+    [
+        ("chassis.z", 0.0005, False),
+        ("chassis.z", 0.5, True),  # mm
+        ("chassis.pitch", math.radians(0.02), False),
+        ("chassis.pitch", 0.02, True),  # deg
+        ("chassis.roll", math.radians(0.02), False),  # nothing but noise
+        ("chassis.a_x", 0.3, False),  # a poor sensor, but the car brakes
+    ],
+)
+def test_noise_in_the_wrong_unit_is_doubted_by_name(name, stated, doubted):
+    """Oracle: by hand; a car bounces by 5 mm and 0.3 deg, sensors err by 0.5 mm and 0.02 deg."""
+    time = np.linspace(0.0, 20.0, 2001)
+    values = {
+        "chassis.z": 0.005 * np.sin(8.0 * time),
+        "chassis.pitch": math.radians(0.3) * np.sin(9.0 * time),
+        "chassis.roll": np.random.default_rng(2).normal(scale=math.radians(0.02), size=time.size),
+        "chassis.a_x": np.where(time > 10.0, -4.0, 0.0),
+    }
+    warnings = doubtful_noise({name: stated}, values)
+    assert len(warnings) == doubted
+    assert all(f"noise of {name}, {stated:g}" in warning for warning in warnings)
 
 
 def test_noise_given_otherwise_is_checked_the_same_way():
