@@ -19,8 +19,12 @@ from .road import Road
 SHORTEST_STEP, LONGEST_STEP = 1e-5, 0.02
 """Accepted integration steps, s: below, rounding and patience suffer; above, wheel hop does."""
 
-MOST_STEPS = 20_000_000
-"""Refused above: half an hour of computing for one car."""
+MOST_MEMORY = 1e9
+"""Refused above: bytes of everything that is kept of one car's steps and samples."""
+
+STEP_BYTES, SAMPLE_BYTES = 800, 2500
+"""Memory of one step (what acts at its three stages) and of one sample (states, outputs and
+channels of both kinds of model)."""
 
 _SAME_INSTANT = 1e-9
 
@@ -50,7 +54,7 @@ class FreeInputs:
 def prepare_free(demand: Demand, step: float, sample_step: float) -> FreeInputs:
     """Steps no longer than `step` and samples every `sample_step` over a demand's duration.
 
-    Raises SimulationError for a step, a sampling or a number of steps outside what is accepted.
+    Raises SimulationError for a step, a sampling or an amount of memory outside what is accepted.
     """
     _check_number("step", step, SHORTEST_STEP, LONGEST_STEP)
     _check_number("sample_step", sample_step, SHORTEST_STEP, 1.0)
@@ -59,11 +63,13 @@ def prepare_free(demand: Demand, step: float, sample_step: float) -> FreeInputs:
             f"duration is {demand.duration} s; it must cover at least one sample step of"
             f" {sample_step} s."
         )
-    expected = demand.duration / min(step, sample_step)
-    if expected > MOST_STEPS:
+    steps, samples = demand.duration / min(step, sample_step), demand.duration / sample_step
+    memory = STEP_BYTES * steps + SAMPLE_BYTES * samples
+    if memory > MOST_MEMORY:
         raise SimulationError(
-            f"{expected:.3g} steps are asked for, {MOST_STEPS} are accepted; take a longer step"
-            " or a shorter duration."
+            f"{demand.duration:g} s in {steps:.3g} steps with {samples:.3g} samples take"
+            f" {memory / 1e9:.3g} GB of memory, {MOST_MEMORY / 1e9:g} GB are accepted; take a"
+            " longer step, fewer samples or a shorter duration."
         )
     count = math.floor(demand.duration / sample_step + _SAME_INSTANT)
     time = sample_step * np.arange(count + 1, dtype=np.float64)

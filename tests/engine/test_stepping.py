@@ -5,7 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 from ridetune.engine.demand import Demand, PiecewiseLinear, PostMotion
 from ridetune.engine.errors import SimulationError
-from ridetune.engine.stepping import prepare_free
+from ridetune.engine.kernels.observe import OUTPUTS
+from ridetune.engine.stepping import SAMPLE_BYTES, STEP_BYTES, prepare_free
 
 JUMP = 0.0123
 
@@ -49,6 +50,17 @@ def test_posts_follow_their_spline_with_its_rate():
     assert_allclose(inputs.stage_inputs[:, 1, 7], cubic.deriv()(middle), atol=1e-12)
 
 
+def test_the_stated_memory_of_a_step_is_at_least_its_arrays():
+    """Oracle: the sizes numpy states of what is kept."""
+    inputs = prepare_free(demand(duration=10.0), step=0.002, sample_step=0.005)
+    kept = sum(array.nbytes for array in (inputs.steps, inputs.samples, inputs.stage_inputs))
+    assert kept <= STEP_BYTES * inputs.steps.size
+    sampled = (
+        inputs.time.nbytes + inputs.sample_inputs.nbytes + 8 * inputs.time.size * (16 + OUTPUTS)
+    )
+    assert sampled <= SAMPLE_BYTES * inputs.time.size
+
+
 @pytest.mark.parametrize(
     ("duration", "step", "sample_step", "named"),
     [
@@ -58,7 +70,8 @@ def test_posts_follow_their_spline_with_its_rate():
         (0.1, 0.002, 0.0, "sample_step is"),
         (0.001, 0.002, 0.005, "duration is"),
         (np.inf, 0.002, 0.005, "duration is"),
-        (1e6, 0.002, 0.005, "steps are asked for"),
+        (1e6, 0.002, 0.005, r"5e\+08 steps with 2e\+08 samples take 900 GB of memory, 1 GB are"),
+        (600.0, 0.02, 0.001, r"take 1.98 GB of memory, .* take a longer step, fewer samples or"),
     ],
 )
 def test_steps_outside_what_is_accepted_are_refused(duration, step, sample_step, named):
