@@ -27,7 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .channels import OUTPUT_CHANNELS
-from .errors import Cancelled
+from .equilibrium import static_loads
+from .errors import Cancelled, VehicleError
 from .filters import smoothed
 from .kernels.lanes import BATCH
 from .problem import Problem
@@ -164,19 +165,29 @@ class Residuals:
 
     def _batch(self, trials: Sequence[Array]) -> Array:
         """Residuals of many cars, (cars, samples of all blocks); a failed car is not a number."""
-        vehicles = [self.problem.vehicle_at(x) for x in trials]
-        rows = []
-        for seen, histories in zip(self.problem.runs, self._histories(vehicles), strict=True):
-            filtered = self._filtered(seen.inputs.time, histories)
-            for channel, measured in seen.measured.items():
-                model = filtered[:, :, OUTPUT_CHANNELS.index(channel)]
-                rows.append((model - measured) / seen.noise[channel])
-        joined = np.concatenate(rows, axis=1)
-        joined[~np.isfinite(joined).all(axis=1)] = np.nan
-        return joined
+        cars = {k: car for k, x in enumerate(trials) if (car := self._possible_car(x)) is not None}
+        blocks = self.blocks()
+        rows = np.full((len(trials), blocks[-1].place.stop), np.nan)
+        if not cars:
+            return rows
+        histories = self._histories(list(cars.values()))
+        for block in blocks:
+            model = histories[block.run][:, :, OUTPUT_CHANNELS.index(block.channel)]
+            rows[list(cars), block.place] = (model - block.measured) / block.noise
+        rows[~np.isfinite(rows).all(axis=1)] = np.nan
+        return rows
 
-    def _histories(self, vehicles: list[Vehicle]) -> list[Array]:
-        """(cars, samples, 3) for every run; the runs side by side, looking at `cancelled`."""
+    def _possible_car(self, x: Array) -> Vehicle | None:
+        """The car at x, or None where bounds admit a geometry that no car can have."""
+        try:
+            vehicle = self.problem.vehicle_at(x)
+            static_loads(vehicle)
+        except VehicleError:
+            return None
+        return vehicle
+
+    def _histories(self, vehicles: list[Vehicle]) -> dict[str, Array]:
+        """By run (cars, samples, 3), filtered; the runs side by side, looking at `cancelled`."""
         pool = ThreadPoolExecutor(RUNS_AT_ONCE)
         try:
             parts = [
@@ -191,7 +202,11 @@ class Residuals:
                 self._stop_if_cancelled()
                 pending = wait(pending, LOOK_EVERY).not_done
             self.simulations += len(vehicles) * len(parts)
-            return [np.concatenate([future.result() for future in run]) for run in parts]
+            done = ([future.result() for future in run] for run in parts)
+            return {
+                seen.name: self._filtered(seen.inputs.time, np.concatenate(of_run))
+                for seen, of_run in zip(self.problem.runs, done, strict=True)
+            }
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
 

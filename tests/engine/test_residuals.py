@@ -153,6 +153,18 @@ def test_cancel_is_seen_while_a_simulation_is_under_way():
         raised.set()
 
 
+def test_a_car_that_bounds_admit_but_geometry_does_not_is_a_failed_trial():
+    """Each bound is possible with the start's other value; together the arm stands upright."""
+    angle, distance = "front.pivot.angle", "front.pivot.distance"
+    bounds = {angle: (-1.46, 1.3), distance: (0.1, 10.0)}
+    residuals = Residuals(
+        Problem.build(CAR, [stand_in.recording(CAR)], [angle, distance], bounds=bounds),
+        stand_in.simulate,
+    )
+    assert np.all(residuals.vector(residuals.lower) == FAILED_TRIAL)
+    assert list(np.isfinite(residuals.squares([residuals.lower, residuals.upper]))) == [False, True]
+
+
 def test_long_runs_are_simulated_in_batches_of_whole_lanes():
     asked = problem([stand_in.recording(CAR, samples=30_001)])
     sizes = []
