@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import SimulationDiverged, SimulationError
-from .frames import COORDINATES
+from .frames import COORDINATES, CORNERS
 from .kernels.buffer import BODY_ROWS
 from .kernels.integrate import integrate_free, integrate_rims
 from .kernels.lanes import BATCH, ONE_CAR
@@ -37,6 +37,7 @@ def _columns(field: str) -> list[int]:
 
 
 _ARM_ACCELERATIONS, _REACHES = _columns("acceleration"), _columns("reach")
+_CLEARANCES = _columns("clearance")
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,10 +46,12 @@ class States:
 
     values (C, S, 16) : NaN from a car's failure on
     failed (C,) : first sample at which a car had left the model's range, or -1
+    reach (C,) : negative where it left the range of its arms or passed the mount of a spring-damper
     """
 
     values: Array
     failed: NDArray[np.int64]
+    reach: Array
 
 
 def free_states(cars: Array, inputs: FreeInputs) -> States:
@@ -62,7 +65,7 @@ def free_states(cars: Array, inputs: FreeInputs) -> States:
     states[:, 8] = inputs.initial_speed
     road = inputs.road
 
-    def integrate(lanes, some_cars, some_states, out, failed):
+    def integrate(lanes, some_cars, some_states, out, failed, reach):
         integrate_free(
             lanes,
             some_cars,
@@ -75,6 +78,7 @@ def free_states(cars: Array, inputs: FreeInputs) -> States:
             road.spacing,
             out,
             failed,
+            reach,
         )
 
     return _run(integrate, cars, states, inputs.time.size)
@@ -92,7 +96,7 @@ def rims_states(cars: Array, inputs: RimsInputs, exact: bool) -> States:
     steps = np.diff(inputs.node_time)
     samples = np.arange(inputs.node_time.size)
 
-    def integrate(lanes, some_cars, some_states, out, failed):
+    def integrate(lanes, some_cars, some_states, out, failed, reach):
         integrate_rims(
             lanes,
             some_cars,
@@ -103,17 +107,18 @@ def rims_states(cars: Array, inputs: RimsInputs, exact: bool) -> States:
             1.0 if exact else 0.0,
             out,
             failed,
+            reach,
         )
 
     return _run(integrate, cars, states, samples.size)
 
 
-def check_sound(states: States, car: int, time: Array, reach: Array | None = None) -> None:
+def check_sound(states: States, car: int, time: Array, outputs: Callable[[int], Array]) -> None:
     """Raise SimulationDiverged where a car has failed, naming time and coordinate.
 
     SimulationError where it failed before the first step, for want of a static equilibrium.
 
-    reach (4,) : of the rims mode, at the failure
+    outputs : sample of the failure -> outputs (OUTPUTS,) of the car on its verge
     """
     sample = int(states.failed[car])
     if sample < 0:
@@ -123,13 +128,21 @@ def check_sound(states: States, car: int, time: Array, reach: Array | None = Non
             "No static equilibrium at the start: the first heights of road, posts or wheels are"
             " out of the suspension's reach; check their unit and that they count from rest."
         )
-    if reach is not None and reach.min() < 0.0:
-        arm = COORDINATES[4 + int(np.argmin(reach))]
+    if states.reach[car] < 0.0:
+        verge = outputs(sample)
+        reach, clearance = verge[_REACHES], verge[_CLEARANCES]
+        if reach.min() < max(clearance.min(), 0.0):
+            raise SimulationDiverged(
+                float(time[sample]),
+                COORDINATES[4 + int(np.argmin(reach))],
+                "the wheel centre cannot reach its measured height; check the wheel channels' unit"
+                " and sign, and the pivot distance.",
+            )
         raise SimulationDiverged(
             float(time[sample]),
-            arm,
-            "the wheel centre cannot reach its measured height; check the wheel channels' unit"
-            " and sign, and the pivot distance.",
+            f"suspension.{CORNERS[int(np.argmin(clearance))]}.travel",
+            "the wheel centre passed the mount of its spring-damper; raise mount_height, stiffen"
+            " the suspension, or check the units of what drives the car.",
         )
     size = np.abs(states.values[car, max(sample - 1, 0), 1:8])
     coordinate = COORDINATES[1 + int(np.argmax(np.where(np.isfinite(size), size, np.inf)))]
@@ -144,16 +157,17 @@ def _run(integrate: Callable, cars: Array, states: Array, samples: int) -> State
     """Integrate in one go, or for a batch in as many threads as there are cores."""
     out = np.zeros((len(cars), samples, 16))
     failed = np.full(len(cars), -1, dtype=np.int64)
+    reach = np.ones(len(cars))
     lanes = ONE_CAR if len(cars) == 1 else BATCH
     parts = _parts(len(cars), len(lanes))
     if len(parts) == 1:
-        integrate(lanes, cars, states, out, failed)
+        integrate(lanes, cars, states, out, failed, reach)
     else:
         with ThreadPoolExecutor(len(parts)) as pool:
             list(
                 pool.map(
                     lambda part: integrate(
-                        lanes, cars[part], states[part], out[part], failed[part]
+                        lanes, cars[part], states[part], out[part], failed[part], reach[part]
                     ),
                     parts,
                 )
@@ -161,7 +175,7 @@ def _run(integrate: Callable, cars: Array, states: Array, samples: int) -> State
     for car, sample in enumerate(failed):
         if sample >= 0:
             out[car, sample:] = np.nan
-    return States(out, failed)
+    return States(out, failed, reach)
 
 
 def _parts(cars: int, lanes: int) -> Sequence[slice]:

@@ -251,7 +251,17 @@ def _free(
         return Simulation(mode, result, _load_shares(result), inputs.steps.size)
     car = car_row(vehicle, lift_off)
     states = free_states(car[np.newaxis], inputs)
-    check_sound(states, 0, inputs.time)
+    check_sound(
+        states,
+        0,
+        inputs.time,
+        lambda sample: free_outputs(
+            car,
+            states.values[0, sample - 1 : sample],
+            inputs.sample_inputs[sample - 1 : sample],
+            inputs.road,
+        )[0],
+    )
     outputs = free_outputs(car, states.values[0], inputs.sample_inputs, inputs.road)
     channels = common_channels(states.values[0], outputs, points)
     channels |= torque_channels(inputs.sample_inputs)
@@ -268,12 +278,14 @@ def _rims_run(vehicle: Vehicle, inputs: RimsInputs, traction: Traction, points: 
     car = car_row(vehicle)
     states = rims_states(car[np.newaxis], inputs, exact)
     nodal = np.concatenate([inputs.stage_inputs[:1, 0], inputs.stage_inputs[:, 2]])
-    failed = int(states.failed[0])
-    if failed >= 0:
-        before = slice(max(failed - 1, 0), max(failed, 1))
-        seen = rims_outputs(car, states.values[0, before], nodal[failed : failed + 1], exact)
-        reach = np.array([corner_output(seen, corner, "reach")[0] for corner in range(4)])
-        check_sound(states, 0, inputs.node_time, reach)
+    check_sound(
+        states,
+        0,
+        inputs.node_time,
+        lambda node: rims_outputs(
+            car, states.values[0, node - 1 : node], nodal[node : node + 1], exact
+        )[0],
+    )
     outputs = rims_outputs(car, states.values[0], nodal, exact)
     channels = common_channels(states.values[0], outputs, points)
     channels |= traction_torques(vehicle, outputs, nodal[:, 14])

@@ -24,7 +24,7 @@ GIVEN = SUM + STATES
 CONTACT = GIVEN + 4 * WHEEL_ROWS
 """X of each wheel centre and its rate."""
 REACH = CONTACT + 8
-"""Least reach since the beginning, rims mode."""
+"""Least reach of an arm and least clearance of a mount since the beginning."""
 CAR = REACH + 1
 ROWS = CAR + CAR_ROWS
 

@@ -59,6 +59,8 @@ class RimCorner(NamedTuple):
     """S without the bar"""
     reach: float
     """Positive while the wheel centre can reach its prescribed height."""
+    clearance: float
+    """Of the spring-damper's mount."""
 
 
 class Linear(NamedTuple):
@@ -131,6 +133,7 @@ def rim_corner(corner, chassis, z, z_rate, rim, direction, braking):
     braked = braking * corner.brake_share
     torque = corner.radius * (driven * corner.drive_reaction + braked * corner.brake_reaction)
     share = driven + braked
+    element = strut(corner, wheel.arm, arm)
     return RimCorner(
         arm,
         wheel,
@@ -143,8 +146,9 @@ def rim_corner(corner, chassis, z, z_rate, rim, direction, braking):
         rolling_arm,
         quad_scale(share, rolling),
         share * rolling_arm + torque,
-        strut(corner, wheel.arm, arm).moment,
+        element.moment,
         reach,
+        element.clearance,
     )
 
 

@@ -34,6 +34,8 @@ class FreeCorner(NamedTuple):
     on_chassis: Quad
     moment: float
     """On the arm about its pivot, from tyre, spring-damper, drive and brake."""
+    clearance: float
+    """Of the spring-damper's mount."""
 
 
 class Accelerations(NamedTuple):
@@ -60,9 +62,10 @@ def free_corner(corner, chassis: Attitude, state, angle, rate, given, direction)
     load = tyre_load(corner, wheel, given.road, given.road_rate)
     force_X, torque = road_wheel_force(corner, load, given, direction)
     on_chassis, on_arm = wheel_force_effect(chassis, wheel, force_X, load, corner.radius)
-    moment = on_arm + torque + strut(corner, wheel.arm, arm).moment
+    element = strut(corner, wheel.arm, arm)
+    moment = on_arm + torque + element.moment
     equation = arm_equation(corner, chassis, arm)
-    return FreeCorner(arm, wheel, equation, force_X, load, on_chassis, moment)
+    return FreeCorner(arm, wheel, equation, force_X, load, on_chassis, moment, element.clearance)
 
 
 @inlined

@@ -21,6 +21,8 @@ class Strut(NamedTuple):
     axis_z: float
     moment: float
     """On the arm about its pivot, N m."""
+    clearance: float
+    """Height of the mount above the wheel centre over that at rest; at 0 the wheel passes it."""
 
 
 @inlined
@@ -45,7 +47,8 @@ def strut(corner, p, arm):
     spring = corner.preload + corner.stiffness * travel
     damper = -corner.damping * length_rate
     moment = -(spring + damper) * (axis_x * along[0] + axis_z * along[2])
-    return Strut(travel, spring, damper, axis_x, axis_z, moment)
+    clearance = z / corner.rest_length
+    return Strut(travel, spring, damper, axis_x, axis_z, moment, clearance)
 
 
 @inlined

@@ -103,7 +103,9 @@ def car_on_rims(buffer, LANES, j, rims, a_x, way, b, exact):
 def _free_slopes(buffer, LANES):
     """Derivative of every lane's stage state, free car."""
     for j in range(LANES):
-        a = free_car(buffer, LANES, j)[5]
+        _, fl, fr, rl, rr, a = free_car(buffer, LANES, j)
+        clearance = min(min(fl.clearance, fr.clearance), min(rl.clearance, rr.clearance))
+        buffer[REACH * LANES + j] = min(buffer[REACH * LANES + j], clearance)
         slope = slope_of(stage_state(buffer, LANES, j), a.chassis, a.fl, a.fr, a.rl, a.rr)
         keep_slope(buffer, LANES, j, slope)
 
@@ -117,7 +119,8 @@ def _rim_slopes(buffer, LANES, u, exact):
     for j in range(LANES):
         _, fl, fr, rl, rr, a = car_on_rims(buffer, LANES, j, rims, a_x, way, b, exact)
         reach = min(min(fl.reach, fr.reach), min(rl.reach, rr.reach))
-        buffer[REACH * LANES + j] = min(buffer[REACH * LANES + j], reach)
+        clearance = min(min(fl.clearance, fr.clearance), min(rl.clearance, rr.clearance))
+        buffer[REACH * LANES + j] = min(buffer[REACH * LANES + j], min(reach, clearance))
         # The arms follow from the chassis; their rows are not integrated.
         slope = slope_of(stage_state(buffer, LANES, j), a.chassis, 0.0, 0.0, 0.0, 0.0)
         keep_slope(buffer, LANES, j, slope)
@@ -159,7 +162,7 @@ def _advance(buffer, LANES, stage, h):
 
 
 @inlined
-def _keep(buffer, LANES, states_out, failed, first, sample):
+def _keep(buffer, LANES, states_out, failed, reach, first, sample):
     """Write the lanes' states as a sample; note the cars that have left the model's range.
 
     Returns whether any car is still sound.
@@ -173,6 +176,7 @@ def _keep(buffer, LANES, states_out, failed, first, sample):
                 sound = sound and abs(buffer[row * LANES + j]) < _ANGLE_LIMIT
             if not sound and failed[car] < 0:
                 failed[car] = sample
+                reach[car] = buffer[REACH * LANES + j]
             sound_left = sound_left or sound
             for row in range(STATES):
                 states_out[car, sample, row] = buffer[row * LANES + j]
@@ -180,7 +184,9 @@ def _keep(buffer, LANES, states_out, failed, first, sample):
 
 
 @compiled
-def integrate_free(lanes, cars, states, inputs, steps, samples, road, start, spacing, out, failed):
+def integrate_free(
+    lanes, cars, states, inputs, steps, samples, road, start, spacing, out, failed, reach
+):
     """Road and posts modes.
 
     lanes : tuple, its length is the number of cars side by side
@@ -190,16 +196,17 @@ def integrate_free(lanes, cars, states, inputs, steps, samples, road, start, spa
         at the beginning, middle and end of each step
     steps (n,) : step lengths, s
     samples (n + 1,) : index into `out` of the state before step k, or -1
-    road (2, cells, 4), start, spacing : splines of `road.Road`, left and right
+    road (2, cells, 4), start, spacing : cubics of `road.Road`, left and right
     out (C, S, 16) : states at the samples
     failed (C,) : set to the first sample at which a car left the model's range, else left alone
+    reach (C,) : likewise to the least reach of its arms and clearance of its mounts until then
     """
     LANES = len(lanes)
     buffer = np.zeros(ROWS * LANES)
     for first in range(0, cars.shape[0], LANES):
         _begin(buffer, LANES, cars, states, first)
         if samples[0] >= 0:
-            _keep(buffer, LANES, out, failed, first, samples[0])
+            _keep(buffer, LANES, out, failed, reach, first, samples[0])
         for k in range(steps.shape[0]):
             _set_out(buffer, LANES)
             for stage in range(4):
@@ -209,12 +216,12 @@ def integrate_free(lanes, cars, states, inputs, steps, samples, road, start, spa
                 _free_slopes(buffer, LANES)
                 _advance(buffer, LANES, stage, steps[k])
             sample = samples[k + 1]
-            if sample >= 0 and not _keep(buffer, LANES, out, failed, first, sample):
+            if sample >= 0 and not _keep(buffer, LANES, out, failed, reach, first, sample):
                 break
 
 
 @compiled
-def integrate_rims(lanes, cars, states, inputs, steps, samples, exact, out, failed):
+def integrate_rims(lanes, cars, states, inputs, steps, samples, exact, out, failed, reach):
     """Rims mode; arguments as in `integrate_free`, but
 
     inputs (n, 3, 15) : u (4), u' (4), u'' (4), a_x, v_x and the braking weight b
@@ -226,12 +233,12 @@ def integrate_rims(lanes, cars, states, inputs, steps, samples, exact, out, fail
     for first in range(0, cars.shape[0], LANES):
         _begin(buffer, LANES, cars, states, first)
         if samples[0] >= 0:
-            _keep(buffer, LANES, out, failed, first, samples[0])
+            _keep(buffer, LANES, out, failed, reach, first, samples[0])
         for k in range(steps.shape[0]):
             _set_out(buffer, LANES)
             for stage in range(4):
                 _rim_slopes(buffer, LANES, inputs[k, (stage + 1) // 2], exact)
                 _advance(buffer, LANES, stage, steps[k])
             sample = samples[k + 1]
-            if sample >= 0 and not _keep(buffer, LANES, out, failed, first, sample):
+            if sample >= 0 and not _keep(buffer, LANES, out, failed, reach, first, sample):
                 break

@@ -47,6 +47,8 @@ class CornerOutput(NamedTuple):
     pivot_z: float
     reach: float
     """Rims mode: negative where the wheel centre cannot reach its prescribed height."""
+    clearance: float
+    """Negative where the wheel centre has passed the mount of its spring-damper."""
 
 
 OUTPUTS = len(CarOutput._fields) + 4 * len(CornerOutput._fields)
@@ -94,6 +96,7 @@ def _corner_output(corner, chassis, seen, c_dd, arm_dd, force_X, force_Z, road, 
         at_pivot[0],
         at_pivot[2],
         reach,
+        element.clearance,
     )
 
 

@@ -5,7 +5,7 @@ from ..jit import inlined
 
 @inlined
 def road_under(coefficients, start, spacing, X):
-    """Height (m) and slope of one side's cubic spline at X, held level outside its ends.
+    """Height (m) and slope of one side's piecewise cubic at X, held level outside its ends.
 
     coefficients : (cells, 4), z = ((c0 s + c1) s + c2) s + c3 with s in [0, 1) along the cell
     """

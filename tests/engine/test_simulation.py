@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from ridetune.engine.car_rows import car_rows
 from ridetune.engine.channels import Run
 from ridetune.engine.errors import SimulationDiverged, SimulationError
-from ridetune.engine.frames import CORNERS, GRAVITY
+from ridetune.engine.frames import AXLES, CORNERS, GRAVITY
 from ridetune.engine.integration import free_states
 from ridetune.engine.manoeuvre import reference_manoeuvres
 from ridetune.engine.rims import prepare
@@ -156,14 +156,47 @@ def test_divergence_names_time_and_coordinate(car):
     assert caught.value.time > 0.0
 
 
+def test_a_wheel_that_passes_the_mount_of_its_strut_is_named(car):
+    """Oracle: the same car with mounts out of the way; the wheel passes a mount 0.1 m above it
+    when its travel there reaches 0.1 m. Struts of 1 m are nearly vertical, as those of 0.1 m are
+    not, which is worth the 10 ms."""
+    time = np.linspace(0.0, 1.0, 201)
+    posts = {f"post.{corner}.z": np.zeros(time.size) for corner in CORNERS}
+    posts["post.fr.z"] = 0.3 * np.clip((time - 0.5) / 0.05, 0.0, 1.0)
+    run, mount = Run("thrown up", time, posts), "front.suspension.mount_height"
+    travel = simulate_posts(car.with_values({mount: 1.0}), run).run["suspension.fr.travel"]
+    passed = time[np.argmax(travel > 0.1)]
+    assert 0.5 < passed < 0.6
+    sentence = r"in suspension\.fr\.travel; the wheel centre passed the mount .* raise mount_height"
+    with pytest.raises(SimulationDiverged, match=sentence) as caught:
+        simulate_posts(car.with_values({mount: 0.1}), run)
+    assert caught.value.time == pytest.approx(passed, abs=0.01)
+
+
+def test_wheels_on_a_recording_that_pass_a_mount_are_named(car):
+    """Oracle: the rear wheels rise 0.2 m in 0.1 s under a car whose body cannot follow."""
+    time = np.linspace(0.0, 1.0, 201)
+    rise = 0.2 * np.clip((time - 0.5) / 0.1, 0.0, 1.0)
+    channels = {f"wheel.{c}.z": rise if c[0] == "r" else 0.0 * time for c in CORNERS}
+    run = Run("thrown up", time, channels | {"chassis.a_x": 0.0 * time})
+    low = car.with_values({"rear.suspension.mount_height": 0.05})
+    with pytest.raises(SimulationDiverged, match=r"in suspension\.r[lr]\.travel; .* mount"):
+        simulate_rims(low, run)
+    assert np.all(np.isnan(rims_batch([low, car], prepare(run, car), "exact")[0, -1]))
+
+
 def test_rims_out_of_reach_are_named(car, driven):
-    """Wheel heights in mm read as m cannot be reached by an arm of 1 m."""
+    """Wheel heights in mm read as m pass any mount, and then cannot be reached by an arm of 1 m."""
     wheels = {
         name: 1000.0 * values if name.startswith("wheel") else values
         for name, values in driven.channels.items()
     }
+    run = Run("wrong unit", driven.time, wheels)
+    with pytest.raises(SimulationDiverged, match=r"passed the mount .* check the units"):
+        simulate_rims(car, run)
+    high = {f"{axle}.suspension.mount_height": 5.0 for axle in AXLES}
     with pytest.raises(SimulationDiverged, match="wheel centre cannot reach"):
-        simulate_rims(car, Run("wrong unit", driven.time, wheels))
+        simulate_rims(car.with_values(high), run)
 
 
 def test_a_car_without_equilibrium_fails_alone_in_its_batch(car, driven):
