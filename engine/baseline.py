@@ -30,7 +30,7 @@ from .channels import Run
 from .demand import Demand, PostMotion, point_mass_motion
 from .equilibrium import static_loads
 from .frames import AXLES, CORNERS, side_of
-from .observation import DEFAULT_POINTS, Points
+from .output_channels import DEFAULT_POINTS, Points
 from .road import LEFT, RIGHT, Road
 from .vehicle import Vehicle
 

@@ -8,7 +8,6 @@ acceleration of the state.
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.engine.simulation import accelerations, rims_accelerations
 
 from ..factories import (
     mirrored,
@@ -19,6 +18,7 @@ from ..factories import (
     random_vehicle,
 )
 from ..oracles.mujoco_car import MujocoCar
+from ..single_state import accelerations, rims_accelerations
 
 ROUND_OFF = 1e-12
 STILL = {name: np.zeros(4) for name in ("road_height", "road_rate", "drive", "brake")}

@@ -9,13 +9,13 @@ import pytest
 from numpy.testing import assert_allclose
 from ridetune.engine.car_rows import car_row
 from ridetune.engine.integration import free_outputs, rims_outputs
-from ridetune.engine.observation import common_channels
+from ridetune.engine.output_channels import common_channels
 from ridetune.engine.road import Road
-from ridetune.engine.simulation import rims_accelerations
 
 from ..factories import random_rims_state, random_road_state, random_vehicle
 from ..oracles.car_tree import CORNERS, about_x, about_y
 from ..oracles.mujoco_car import MujocoCar
+from ..single_state import rims_accelerations
 
 SEAT = (-0.3, 0.4, 0.2)
 
