@@ -14,7 +14,7 @@ from ..engine.channels import CHANNELS
 from ..engine.parameters import PARAMETERS
 from ..engine.vehicle_file import reference_vehicles, vehicle_to_json
 from .errors import NotFound
-from .schemas import RoadPreview
+from .schemas import RimsSettingsForm, RoadPreview
 from .strict_json import StrictRoute
 
 router = APIRouter(prefix="/api", tags=["catalogue"], route_class=StrictRoute)
@@ -31,6 +31,12 @@ def channels() -> list[dict[str, Any]]:
     """Every channel: name, SI unit, and how a page shows it."""
     shown = ("name", "label", "quantity", "unit", "display_unit", "display_factor", "sign")
     return [{key: getattr(info, key) for key in shown} for info in CHANNELS.values()]
+
+
+@router.get("/rims-settings")
+def rims_settings() -> dict[str, Any]:
+    """How recordings are prepared for the rims mode unless a request says otherwise."""
+    return RimsSettingsForm().model_dump()
 
 
 @router.get("/vehicles")

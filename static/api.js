@@ -90,6 +90,7 @@ export const vehicles = () => json("GET", "/api/vehicles");
 export const referenceVehicle = (key) => json("GET", `/api/vehicles/${encodeURIComponent(key)}`);
 export const manoeuvres = () => json("GET", "/api/manoeuvres");
 export const roads = () => json("GET", "/api/roads");
+export const rimsSettings = () => json("GET", "/api/rims-settings");
 
 // The session
 export const session = () => json("GET", base);

@@ -4,6 +4,7 @@ import * as api from "./api.js";
 import { withValues } from "./controls.js";
 import { $, h } from "./dom.js";
 import { notice, refused } from "./notices.js";
+import { brakingOf, rimsOf } from "./preparation.js";
 import * as result from "./result.js";
 import * as setup from "./setup.js";
 import { get, on, set } from "./store.js";
@@ -70,6 +71,8 @@ async function start() {
     runs: runs.map(({ id }) => id),
     free: names.filter((name) => !choice.fixed.has(name)),
     traction: get("traction"),
+    settings: get("rimsSettings"),
+    braking: brakingOf(runs.map(({ id }) => id)),
     key: crypto.randomUUID?.() ?? String(Math.random()).slice(2),
   };
   if (Object.keys(choice.bounds).length) body.bounds = choice.bounds;
@@ -115,6 +118,7 @@ async function finished() {
 /** A run that the fit has not seen, driven by the identified car. */
 async function scoreHoldouts() {
   const fitted = job;
+  const { step: _, ...settings } = fitted.result.settings;
   const used = new Set(fitted.runs.map(({ id }) => id));
   const ids = Object.keys(holdouts).length ? Object.keys(holdouts)
     : get("measurements").filter((m) => m.usable_for_identification && !used.has(m.id))
@@ -122,7 +126,8 @@ async function scoreHoldouts() {
   for (const id of ids) {
     try {
       const run = await api.simulate({
-        vehicle: fitted.result.vehicle, rims: { measurement: id, traction: fitted.traction },
+        vehicle: fitted.result.vehicle,
+        rims: { ...rimsOf(id), traction: fitted.traction, settings },
         channels: ["chassis.z"], max_samples: 10,
       });
       holdouts = { ...holdouts, [id]: run.head.fit_percent };

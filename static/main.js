@@ -33,14 +33,15 @@ let saving = false;
 async function start() {
   api.useSession(sid);
   set({ session: sid, online: true, ready: false, compare: "baseline", road: null, liftOff: false, fit: null,
-    now: null, reference: null, measured: null, traction: "exact" });
-  const [session, parameters, channels, vehicles, manoeuvres, roads] = await Promise.all([
+    now: null, reference: null, measured: null, traction: "exact", braking: {} });
+  const [session, parameters, channels, vehicles, manoeuvres, roads, rimsSettings] = await Promise.all([
     api.session(), api.parameters(), api.channels(), api.vehicles(), api.manoeuvres(), api.roads(),
+    api.rimsSettings(),
   ]);
   units.learn(channels, parameters);
   const { vehicle, measurements: rows } = session;
   const baseline = session.baseline ?? vehicle;
-  set({ parameters, vehicles, manoeuvres, roads, vehicle, baseline, measurements: rows });
+  set({ parameters, vehicles, manoeuvres, roads, rimsSettings, vehicle, baseline, measurements: rows });
   const usable = rows.find((row) => row.usable_for_identification);
   set({
     values: controls.valuesOf(vehicle),
@@ -83,7 +84,7 @@ function follow() {
     want("now", ...(get("compare") === "7dof" ? ["reference"] : []));
   });
   on("baseline compare", () => want("reference"));
-  on("liftOff traction", () => want("now", "reference"));
+  on("liftOff traction rimsSettings braking", () => want("now", "reference"));
   on("vehicle", () => want("now", "scene", "reference"));
   on("ride road", () => {
     set({ now: null, reference: null, measured: null });

@@ -1,7 +1,8 @@
 // What an identification is told: which runs, which parameters are free, between which bounds.
 
 import { breakable, h, symbol } from "./dom.js";
-import { get, set } from "./store.js";
+import * as preparation from "./preparation.js";
+import { get } from "./store.js";
 import * as units from "./units.js";
 
 const ROLES = { fit: "fit", holdout: "hold out", no: "leave out" };
@@ -27,15 +28,12 @@ export function view(redraw) {
     h("section", {},
       h("h3", {}, "Runs"),
       runs.length
-        ? h("table", { className: "runs" }, h("tbody", {}, runs.map(runRow)))
+        ? h("ul", { className: "runs" }, runs.map((run) => runRow(run, redraw)))
         : h("p", { className: "empty" }, "No measurement yet; add one under Measurements."),
       h("p", { className: "hint" },
         "Unless you choose, the ride on show is fitted. A run held out is not: it shows how well " +
         "the car predicts what it has not seen."),
-      h("label", { className: "block" }, "Traction",
-        select({ exact: "exact: the traction that gives the measured a_x",
-          paper: "paper: total mass times a_x (biased)" }, get("traction"),
-        (traction) => set({ traction }), { id: "traction" }))),
+      preparation.view(redraw)),
     h("section", {},
       h("h3", {}, "Free parameters"),
       h("table", { className: "free" },
@@ -44,15 +42,17 @@ export function view(redraw) {
         h("tbody", {}, get("parameters").map((parameter) => freeRow(parameter, redraw))))));
 }
 
-function runRow(run) {
+function runRow(run, redraw) {
   const role = roleOf(run);
-  return h("tr", {},
-    h("th", { scope: "row", title: run.name }, breakable(run.name)),
-    h("td", {}, run.usable_for_identification
-      ? select(ROLES, role, (value) => { choice.roles[run.id] = value; },
-        { "aria-label": `Use of ${run.name}` })
+  return h("li", {},
+    h("span", { className: "run-name", title: run.name }, breakable(run.name)),
+    run.usable_for_identification
+      ? h("span", { className: "run-use" },
+          select(ROLES, role, (value) => { choice.roles[run.id] = value; },
+            { "aria-label": `Use of ${run.name}` }),
+          h("label", {}, "brakes", preparation.brakingField(run, redraw)))
       : h("span", { className: "badge", title: `It lacks ${run.missing.join(", ")}.` },
-        "not for fitting")));
+        "not for fitting"));
 }
 
 function select(options, value, change, properties) {

@@ -5,6 +5,7 @@ import { allChannels, visibleChannels } from "./charts.js";
 import { $ } from "./dom.js";
 import { withValues } from "./controls.js";
 import { POSE_CHANNELS } from "./poses.js";
+import { rimsOf } from "./preparation.js";
 import { get, set } from "./store.js";
 
 const MOST_SAMPLES = 2001;
@@ -44,7 +45,7 @@ export function ofRide(car) {
   const ride = get("ride");
   const body = { ...car };
   if (ride.kind === "measurement") {
-    body.rims = { measurement: ride.id, traction: get("traction") };
+    body.rims = rimsOf(ride.id);
   } else {
     body.manoeuvre = ride.key;
     body.lift_off = get("liftOff");

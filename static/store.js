@@ -9,6 +9,8 @@
 //   ride         {kind: "measurement", id} or {kind: "manoeuvre", key}
 //   road         null (as the manoeuvre says) or a road description
 //   traction     how a measured ride gets its traction, "exact" or "paper"
+//   rimsSettings   filters and initial state with which recordings drive the model
+//   braking      {measurement id: [[begin, end], ...]} in s, marked by hand
 //   liftOff      wheels may leave the road
 //   compare      "baseline", "7dof" or "none"
 //   now, reference, measured   runs (see api.js) of the ride, or null

@@ -6,6 +6,7 @@ import pytest
 from ridetune.engine.channels import CHANNELS
 from ridetune.engine.manoeuvre import manoeuvre_from_json, reference_manoeuvres
 from ridetune.engine.parameters import PARAMETER_NAMES
+from ridetune.engine.rims_settings import RimsSettings
 from ridetune.engine.vehicle_file import reference_vehicles, vehicle_from_json
 
 
@@ -18,6 +19,11 @@ def test_the_tables_are_the_engines(client):
     pitch = next(row for row in channels if row["name"] == "chassis.pitch")
     assert (pitch["unit"], pitch["display_unit"]) == ("rad", "deg")
     assert pitch["display_factor"] == pytest.approx(180.0 / math.pi)
+
+
+def test_the_settings_of_the_rims_mode_are_the_engines(client):
+    settings = client.get("/api/rims-settings").json()
+    assert RimsSettings(**settings) == RimsSettings()
 
 
 def test_every_listed_car_reads_back_as_itself(client):

@@ -1,0 +1,95 @@
+// How recordings drive the model: traction, initial state, filters, and when each run brakes.
+
+import { h } from "./dom.js";
+import { get, set } from "./store.js";
+
+const FILTERS = [
+  ["a_x_cutoff_hz", "aₓ", "longitudinal acceleration"],
+  ["rim_cutoff_hz", "wheels", "wheel centres"],
+  ["output_cutoff_hz", "z, pitch, roll", "compared channels, recorded and simulated alike"],
+];
+const TRACTIONS = { exact: "exact", paper: "paper (biased)" };
+const STATES = { equilibrium: "equilibrium", measured: "as measured" };
+
+/** What a simulation or a fit is told of one recording. */
+export function rimsOf(id) {
+  const rims = { measurement: id, traction: get("traction"), settings: get("rimsSettings") };
+  const braking = get("braking")[id];
+  return braking ? { ...rims, braking } : rims;
+}
+
+/** Braking marked by hand, of the recordings given. */
+export const brakingOf = (ids) =>
+  Object.fromEntries(Object.entries(get("braking")).filter(([id]) => ids.includes(id)));
+
+/** The choices that hold for every recording. */
+export function view(redraw) {
+  const settings = get("rimsSettings");
+  const change = (changes) => set({ rimsSettings: { ...settings, ...changes } });
+  return h("details", { className: "preparation", open: opened,
+    on: { toggle: (event) => { opened = event.target.open; } } },
+    h("summary", {}, "How recordings drive the model"),
+    choice("Traction", "traction", TRACTIONS, get("traction"), (traction) => set({ traction }),
+      "exact: the force that gives the measured aₓ; paper: total mass times aₓ"),
+    choice("Initial state", "initial-state", STATES, settings.initial_state,
+      (initial_state) => change({ initial_state }),
+      "of the body: at rest under the first wheel heights, or from the first 0.2 s of z, pitch, roll"),
+    h("table", { className: "filters" },
+      h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Low-pass"),
+        h("th", { scope: "col" }, "Hz; empty: none"))),
+      h("tbody", {}, FILTERS.map(([key, name, what]) => {
+        const field = h("input", {
+          type: "number", min: "0", step: "any", value: settings[key] ?? "",
+          "aria-label": `Low-pass of the ${what}, Hz; empty for none`,
+          on: { change: () => {
+            const hertz = field.value === "" ? null : Number(field.value);
+            if (hertz === null || hertz > 0) change({ [key]: hertz });
+            redraw();
+          } },
+        });
+        return h("tr", {}, h("th", { scope: "row", title: what }, name), h("td", {}, field));
+      }))));
+}
+
+let opened = false;
+
+function choice(label, id, options, chosen, change, title) {
+  const element = h("select", { id, title, on: { change: () => change(element.value) } },
+    Object.entries(options).map(([key, text]) =>
+      h("option", { value: key, selected: key === chosen }, text)));
+  return h("label", { className: "block" }, label, element);
+}
+
+/** When one run brakes, s: a field that is empty while aₓ tells. */
+export function brakingField(run, redraw) {
+  const marked = get("braking")[run.id];
+  const field = h("input", {
+    type: "text", className: "braking", value: marked ? written(marked) : "",
+    placeholder: "as aₓ shows", "aria-label": `When ${run.name} brakes`,
+    title: "When the car brakes, s, e.g. 6.2-9.8 or 3-4, 12-15; none for never; empty: found in aₓ",
+    on: { change: () => {
+      const { [run.id]: _, ...others } = get("braking");
+      const intervals = parsed(field.value);
+      field.setCustomValidity(intervals === undefined
+        ? "Write begin-end in seconds, such as 6.2-9.8, or none." : "");
+      if (!field.reportValidity()) return;
+      set({ braking: intervals ? { ...others, [run.id]: intervals } : others });
+      redraw();
+    } },
+  });
+  return field;
+}
+
+const written = (intervals) =>
+  intervals.length ? intervals.map((interval) => interval.join("-")).join(", ") : "none";
+
+/** Intervals in s; null where nothing is marked, undefined for what cannot be read. */
+function parsed(text) {
+  const said = text.trim().toLowerCase();
+  if (said === "") return null;
+  if (said === "none") return [];
+  const found = said.split(/[,;]/).map((part) =>
+    /^\s*(\d+(?:\.\d+)?)\s*(?:-|–|:|to)\s*(\d+(?:\.\d+)?)\s*s?\s*$/.exec(part));
+  return found.every(Boolean) ? found.map(([, begin, end]) => [Number(begin), Number(end)])
+    : undefined;
+}
