@@ -20,6 +20,7 @@ from .errors import ManoeuvreError
 from .json_record import RecordReader, record_to_json
 from .json_text import read_json
 from .post_sweep import PostSweep
+from .road import Road
 from .road_specs import FlatRoad, Place, RoadSpec
 from .torque_laws import LONGEST, BrakeLaw, DriveLaw, Speed
 from .vehicle import Range, Vehicle
@@ -81,17 +82,20 @@ class Manoeuvre:
         if self.kind == "road" and self.posts is not None:
             raise ManoeuvreError('"posts" belongs to kind "posts"; remove it or change the kind.')
 
-    def demand(self, vehicle: Vehicle) -> Demand:
-        """What this manoeuvre asks of one car: its torques, and its road or posts."""
+    def demand(self, vehicle: Vehicle, road: Road | None = None) -> Demand:
+        """What this manoeuvre asks of one car: its torques, and its road or posts.
+
+        road : takes the place of the manoeuvre's own
+        """
         drive = brake = PiecewiseLinear.zero(self.duration)
         if self.drive is not None:
             drive = self.drive.wheel_torque(vehicle, self.initial_speed, self.duration)
         if self.brake is not None:
             brake = self.brake.wheel_torque(vehicle, self.duration)
-        road = posts = None
+        posts = None
         if self.posts is not None:
             posts = self.posts.motion(self.duration)
-        else:
+        elif road is None:
             motion = point_mass_motion(vehicle, drive, brake, self.initial_speed, self.duration)
             road = (self.road or FlatRoad()).build(self._place(vehicle, motion), self.seed)
         return Demand(self.duration, self.initial_speed, drive, brake, road, posts)

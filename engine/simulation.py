@@ -7,7 +7,7 @@ car on four moving posts. `rims_batch` is the identification's view of many cars
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from . import baseline
 from .car_rows import car_row, car_rows
 from .channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
 from .demand import Demand, PiecewiseLinear, PostMotion
-from .errors import SimulationError
+from .errors import SimulationDiverged, SimulationError
 from .filters import smoothed
 from .frames import CORNERS
 from .integration import check_sound, free_outputs, free_states, rims_outputs, rims_states
@@ -41,6 +41,9 @@ Traction = Literal["exact", "paper"]
 
 FREE_STEP = 0.002
 """Integration step of the road and posts modes, s: wheel hop is in them."""
+
+FASTEST = 150.0
+"""Greatest speed that a simulation may reach, m/s."""
 
 SAMPLE_STEP = 0.005
 """Time between samples of a result, s."""
@@ -78,7 +81,7 @@ def simulate_road(
 ) -> Simulation:
     """Drive a car through a manoeuvre of kind "road".
 
-    road : takes the place of the manoeuvre's own
+    road : takes the place of the manoeuvre's own; a warning tells where the car leaves it
     lift_off : tyres do not pull
     Raises SimulationError for a manoeuvre of the other kind or steps outside what is accepted,
     SimulationDiverged when the car leaves the model's range.
@@ -87,12 +90,13 @@ def simulate_road(
         raise SimulationError(
             f"Manoeuvre {manoeuvre.name!r} moves the posts of a rig; simulate it in posts mode."
         )
-    demand = manoeuvre.demand(vehicle)
-    if road is not None:
-        demand = replace(demand, road=road)
-    return _free(
+    demand = manoeuvre.demand(vehicle, road)
+    found = _free(
         "road", vehicle, manoeuvre.name, demand, model, lift_off, step, sample_step, points
     )
+    if road is None:
+        return found
+    return replace(found, warnings=_road_warnings(road, vehicle, found.run))
 
 
 def simulate_posts(
@@ -136,19 +140,20 @@ def simulate_rims(
     Raises MeasurementError for a run without the inputs, SimulationDiverged when a wheel centre
     cannot reach its height or the car leaves the model's range.
     """
+    _require_choice("traction", traction, Traction)
+    _require_choice("model", model, Model)
     settings = settings or RimsSettings()
     inputs = prepare(run, vehicle, settings)
     if model == "7dof":
         heights = np.column_stack([run[name] for name in WHEEL_CHANNELS])
+        heights = smoothed(run.time, heights, settings.rim_cutoff_hz)
         result = replace(baseline.simulate_rims(vehicle, run.time, heights, points), name=run.name)
-        loads = {}
     else:
         result = _rims_run(vehicle, inputs, traction, points)
-        loads = _load_shares(result)
     return Simulation(
         "rims",
         result,
-        loads,
+        _load_shares(result),
         inputs.node_time.size - 1,
         _fit_percent(result, run, settings),
         inputs.warnings,
@@ -157,6 +162,7 @@ def simulate_rims(
 
 def rims_batch(vehicles: Sequence[Vehicle], inputs: RimsInputs, traction: Traction) -> Array:
     """z, pitch and roll of many cars on the same rims, (cars, samples, 3); NaN where one failed."""
+    _require_choice("traction", traction, Traction)
     states = rims_states(car_rows(vehicles), inputs, traction == "exact")
     values, rates = states.values[:, :, 1:4], states.values[:, :, 9:12]
     return inputs.at_samples(values, rates)
@@ -183,6 +189,7 @@ def _free(
     points: Points,
 ) -> Simulation:
     """Road and posts modes, which differ only in what moves the contact points."""
+    _require_choice("model", model, Model)
     inputs = prepare_free(demand, step, sample_step)
     if model == "7dof":
         if demand.posts is not None:
@@ -190,6 +197,7 @@ def _free(
         else:
             result = baseline.simulate_road(vehicle, demand, sample_step, points)
         result = replace(result, name=name)
+        _check_speed(result)
         return Simulation(mode, result, _load_shares(result), inputs.steps.size)
     car = car_row(vehicle, lift_off)
     states = free_states(car[np.newaxis], inputs)
@@ -211,6 +219,7 @@ def _free(
     for index, corner in enumerate(CORNERS):
         channels[ground.format(corner)] = corner_output(outputs, index, "road")
     result = Run(name, inputs.time, channels)
+    _check_speed(result)
     return Simulation(mode, result, _load_shares(result), inputs.steps.size)
 
 
@@ -245,6 +254,48 @@ def _rims_run(vehicle: Vehicle, inputs: RimsInputs, traction: Traction, points: 
     return Run(inputs.name, inputs.time, channels)
 
 
+def _require_choice(name: str, value: str, choices: Any) -> None:
+    """Raise SimulationError unless a value is one of a Literal's."""
+    if value not in get_args(choices):
+        listed = " or ".join(f'"{choice}"' for choice in get_args(choices))
+        raise SimulationError(f'{name} is "{value}"; it can be {listed}.')
+
+
+def _check_speed(run: Run) -> None:
+    """Raise SimulationDiverged where a car drives faster than a car can."""
+    if "chassis.v_x" not in run:
+        return
+    fast = np.abs(run["chassis.v_x"]) > FASTEST
+    if fast.any():
+        raise SimulationDiverged(
+            float(run.time[np.argmax(fast)]),
+            "chassis.v_x",
+            f"the car is faster than {FASTEST:g} m/s, where the model means nothing; lower the"
+            " torque or the initial speed, or shorten the manoeuvre.",
+        )
+
+
+def _road_warnings(road: Road, vehicle: Vehicle, run: Run) -> tuple[str, ...]:
+    """Where the front wheels are on no profile; before and after it the ground is level."""
+    warnings, name = [], road.name or "given"
+    standing = vehicle.front.cg_distance
+    front = standing + run["chassis.x"]
+    if road.start > standing:
+        warnings.append(
+            f"The road {name} begins at X = {road.start:.2f} m, ahead of the front wheels, which"
+            f" start at {standing:.2f} m: the ground is level up to there; shift its x if the"
+            " profile was to begin under the car (X = 0 is where its CG stands)."
+        )
+    beyond = front > road.end
+    if beyond.any():
+        warnings.append(
+            f"The road {name} ends at X = {road.end:.2f} m, which the front wheels pass at t ="
+            f" {run.time[np.argmax(beyond)]:.2f} s on their way to {front.max():.2f} m: the ground"
+            " is level from there on; lengthen the profile, shift its x or shorten the manoeuvre."
+        )
+    return tuple(warnings)
+
+
 def _fit_percent(simulated: Run, measured: Run, settings: RimsSettings) -> dict[str, float]:
     """Fit of every channel that was measured, simulated and not prescribed."""
     given = {*INPUT_CHANNELS, "chassis.v_x", "chassis.x"}
@@ -273,6 +324,11 @@ def _posts_demand(run: Run) -> Demand:
         raise SimulationError(
             f"Run {run.name} lacks {', '.join(missing)}; a rig test needs time and the four"
             " post.*.z."
+        )
+    gaps = [name for name in names if not np.all(np.isfinite(run[name]))]
+    if gaps:
+        raise SimulationError(
+            f"Run {run.name} has gaps (not a number) in {', '.join(gaps)}; cut the record there."
         )
     time = run.time - run.time[0]
     heights = np.column_stack([run[name] for name in names])

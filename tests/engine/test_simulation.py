@@ -7,10 +7,10 @@ import pytest
 from numpy.testing import assert_allclose
 from ridetune.engine.car_rows import car_rows
 from ridetune.engine.channels import Run
-from ridetune.engine.errors import SimulationDiverged, SimulationError
+from ridetune.engine.errors import RoadError, SimulationDiverged, SimulationError
 from ridetune.engine.frames import AXLES, CORNERS, GRAVITY
 from ridetune.engine.integration import free_states
-from ridetune.engine.manoeuvre import reference_manoeuvres
+from ridetune.engine.manoeuvre import manoeuvre_from_json, reference_manoeuvres
 from ridetune.engine.rims import prepare
 from ridetune.engine.road import Road
 from ridetune.engine.simulation import (
@@ -20,6 +20,7 @@ from ridetune.engine.simulation import (
     simulate_road,
 )
 from ridetune.engine.stepping import prepare_free
+from ridetune.engine.torque_laws import HoldSpeed
 from ridetune.engine.vehicle_file import reference_vehicles
 
 PLACES = ("mount", "pivot")
@@ -229,6 +230,78 @@ def test_modes_refuse_each_others_manoeuvres(car):
         simulate_posts(car, manoeuvres["2"])
     with pytest.raises(SimulationError, match="lacks post.fl.z"):
         simulate_posts(car, Run("none", np.array([0.0, 1.0]), {}))
+
+
+def test_a_misspelt_choice_is_refused_with_the_choices(car, driven, short_drive):
+    with pytest.raises(SimulationError, match='traction is "exakt"; it can be "exact" or "paper"'):
+        simulate_rims(car, driven, traction="exakt")
+    with pytest.raises(SimulationError, match='traction is "typo"; it can be "exact" or "paper"'):
+        rims_batch([car], prepare(driven, car), "typo")
+    for simulate, motion in (
+        (simulate_road, short_drive),
+        (simulate_posts, reference_manoeuvres()["heave"]),
+        (simulate_rims, driven),
+    ):
+        with pytest.raises(SimulationError, match='model is "7DOF"; it can be "8dof" or "7dof"'):
+            simulate(car, motion, model="7DOF")
+
+
+def test_posts_with_gaps_are_refused(car):
+    time = np.linspace(0.0, 1.0, 101)
+    posts = {f"post.{corner}.z": np.zeros(time.size) for corner in CORNERS}
+    posts["post.rl.z"] = np.where(time == 0.5, np.nan, 0.0)
+    with pytest.raises(SimulationError, match=r"gaps \(not a number\) in post\.rl\.z; cut"):
+        simulate_posts(car, Run("holed", time, posts))
+
+
+@pytest.mark.parametrize("model", ["8dof", "7dof"])
+def test_leaving_a_given_road_is_told_with_place_and_time(car, model):
+    """Oracle: at 20 m/s the front wheels, 1.30 m ahead, pass X = 31.28 m at 1.499 s."""
+    drive = replace(reference_manoeuvres()["constant-speed-c"], duration=3.0)
+    level = np.zeros(31)
+
+    def warnings(start, spacing):
+        road = Road(start, spacing, level, level, name="r.csv")
+        return simulate_road(car, drive, road=road, model=model).warnings
+
+    [short] = warnings(1.28, 1.0)
+    assert "r.csv ends at X = 31.28 m" in short
+    assert "pass at t = 1.50 s on their way to 61.30 m" in short
+    assert warnings(0.0, 3.0) == ()
+    [displaced] = warnings(20.0, 2.0)
+    assert "begins at X = 20.00 m, ahead of the front wheels, which start at 1.30 m" in displaced
+    assert len(warnings(1000.0, 1.0)) == 1
+    assert simulate_road(car, drive, model=model).warnings == ()
+
+
+def test_a_given_road_spares_building_the_manoeuvre_s_own(car):
+    """Oracle: a manoeuvre whose own road cannot be built, on a road that can."""
+    held = replace(reference_manoeuvres()["2"], duration=1.0, initial_speed=5.0, drive=HoldSpeed())
+    with pytest.raises(RoadError, match="never ends"):
+        simulate_road(car, held)
+    assert simulate_road(car, held, road=Road.flat()).run.duration == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("model", ["8dof", "7dof"])
+def test_a_speed_no_car_reaches_is_refused(car, model):
+    """Oracle: 150 m/s over the acceleration of 3000 N m on 0.3 m and 1240 kg, less fr g."""
+    data = {"kind": "table", "time": [0, 25], "torque": [3000, 3000]}
+    wild = manoeuvre_from_json({"name": "t", "kind": "road", "duration": 25, "drive": data})
+    sentence = r"in chassis\.v_x; .* faster than 150 m/s"
+    with pytest.raises(SimulationDiverged, match=sentence) as caught:
+        simulate_road(car, wild, model=model)
+    assert caught.value.time == pytest.approx(
+        150.0 / (3e3 / 0.3 / 1240.0 - 0.01 * GRAVITY), rel=1e-3
+    )
+
+
+def test_both_models_report_the_loads_on_rims(car, driven):
+    """Oracle: the share counted from the run's own loads."""
+    for model in ("8dof", "7dof"):
+        found = simulate_rims(car, driven, model=model)
+        for corner, share in found.negative_load_share.items():
+            assert share == np.mean(found.run[f"tyre.{corner}.load"] <= 0.0)
+        assert list(found.negative_load_share) == list(CORNERS)
 
 
 def test_rims_fed_back_reproduce_the_chassis(car, driven):
