@@ -36,8 +36,8 @@ def _columns(field: str) -> list[int]:
     return [first + corner * CORNER_SIZE for corner in range(4)]
 
 
-_ARM_ACCELERATIONS, _REACHES = _columns("acceleration"), _columns("reach")
-_CLEARANCES = _columns("clearance")
+ARM_ACCELERATIONS = _columns("acceleration")
+_REACHES, _CLEARANCES = _columns("reach"), _columns("clearance")
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,7 +209,7 @@ def _free_rest(car: Array, inputs: FreeInputs) -> Array:
         states = np.zeros((len(q), 16))
         states[:, 1:8] = q
         out = free_outputs(car, states, np.tile(acting, (len(q), 1)), inputs.road)
-        return np.concatenate([out[:, 1:4], out[:, _ARM_ACCELERATIONS]], axis=1)
+        return np.concatenate([out[:, 1:4], out[:, ARM_ACCELERATIONS]], axis=1)
 
     state = np.zeros(16)
     state[1:8] = _rest(accelerations, np.zeros(7))

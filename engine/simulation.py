@@ -32,6 +32,7 @@ from .output_channels import (
 from .rims import RimsInputs, prepare
 from .rims_settings import RimsSettings
 from .road import Road
+from .stability import check_free_step, check_rims_step
 from .stepping import prepare_free
 from .vehicle import Vehicle
 
@@ -83,8 +84,8 @@ def simulate_road(
 
     road : takes the place of the manoeuvre's own; a warning tells where the car leaves it
     lift_off : tyres do not pull
-    Raises SimulationError for a manoeuvre of the other kind or steps outside what is accepted,
-    SimulationDiverged when the car leaves the model's range.
+    Raises SimulationError for a manoeuvre of the other kind or steps outside what is accepted or
+    too long for the car, SimulationDiverged when the car leaves the model's range.
     """
     if manoeuvre.kind != "road":
         raise SimulationError(
@@ -137,8 +138,9 @@ def simulate_rims(
     """Let a car follow the wheel centres and a_x of a recording, at the recording's own times.
 
     traction : "exact" follows a_x exactly; "paper" is the paper's Eq. 3, biased, for comparison
-    Raises MeasurementError for a run without the inputs, SimulationDiverged when a wheel centre
-    cannot reach its height or the car leaves the model's range.
+    Raises MeasurementError for a run without the inputs, SimulationError for a step too long for
+    the car, SimulationDiverged when a wheel centre cannot reach its height or the car leaves the
+    model's range.
     """
     _require_choice("traction", traction, Traction)
     _require_choice("model", model, Model)
@@ -200,6 +202,7 @@ def _free(
         _check_speed(result)
         return Simulation(mode, result, _load_shares(result), inputs.steps.size)
     car = car_row(vehicle, lift_off)
+    check_free_step(car, demand.brake.values.max(axis=0), float(inputs.steps.max()))
     states = free_states(car[np.newaxis], inputs)
     check_sound(
         states,
@@ -227,6 +230,7 @@ def _rims_run(vehicle: Vehicle, inputs: RimsInputs, traction: Traction, points: 
     """Channels of the 8-DOF car on its rims, at the recording's times."""
     exact = traction == "exact"
     car = car_row(vehicle)
+    check_rims_step(car, float(np.diff(inputs.node_time).max()))
     states = rims_states(car[np.newaxis], inputs, exact)
     nodal = np.concatenate([inputs.stage_inputs[:1, 0], inputs.stage_inputs[:, 2]])
     check_sound(

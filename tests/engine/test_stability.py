@@ -1,0 +1,121 @@
+"""RK4's limit of stability, and the refusal of steps beyond it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from ridetune.engine.car_rows import car_row
+from ridetune.engine.channels import Run
+from ridetune.engine.demand import Demand, PiecewiseLinear
+from ridetune.engine.errors import SimulationError
+from ridetune.engine.frames import CORNERS
+from ridetune.engine.integration import free_states
+from ridetune.engine.manoeuvre import manoeuvre_from_json, reference_manoeuvres
+from ridetune.engine.rims_settings import RimsSettings
+from ridetune.engine.simulation import simulate_posts, simulate_rims, simulate_road
+from ridetune.engine.stability import MARGIN, check_free_step, eigenvalues, largest_stable_step
+from ridetune.engine.stepping import prepare_free
+from ridetune.engine.vehicle_file import reference_vehicles
+
+from ..factories import paper_vehicle
+
+STIFF = {"front.suspension.damping": 2e5}
+
+
+@pytest.mark.parametrize(
+    ("value", "limit"),
+    [(-1000.0, 2.7852936e-3), (100j, 2.8284271e-2), (-1e-9 + 50j, 2.0**1.5 / 50.0)],
+)
+def test_the_limits_on_the_axes_are_those_of_the_textbooks(value, limit):
+    """Oracle: Hairer and Wanner, the real root of R(z) = 1, and 2 sqrt(2)."""
+    assert_allclose(largest_stable_step(np.array([value, np.conj(value)])), limit, rtol=5e-4)
+
+
+@pytest.mark.parametrize("angle", [100.0, 120.0, 150.0, 170.0])
+def test_the_limit_between_the_axes_is_where_steps_begin_to_grow(angle):
+    """Oracle: RK4 steps of y' = s y, taken one by one."""
+    s = 40.0 * np.exp(1j * np.radians(angle))
+    limit = largest_stable_step(np.array([s, np.conj(s)]))
+
+    def after(h):
+        y = 1.0 + 0.0j
+        for _ in range(4000):
+            k1 = s * y
+            k2 = s * (y + 0.5 * h * k1)
+            k3 = s * (y + 0.5 * h * k2)
+            k4 = s * (y + h * k3)
+            y += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+        return abs(y)
+
+    assert after(0.998 * limit) < 1.0
+    assert after(1.002 * limit) > 1.0
+
+
+def test_the_eigenvalues_are_those_of_an_oscillator():
+    """Oracle: s^2 + 2 D w s + w^2 = 0; and a motion without any force does not count."""
+
+    def oscillator(q, rates):
+        return np.column_stack([-(50.0**2) * q[:, 0] - 2 * 0.2 * 50.0 * rates[:, 0], 0 * q[:, 1]])
+
+    found = eigenvalues(oscillator, 2)
+    expected = -10.0 + 50.0j * np.sqrt(1 - 0.2**2)
+    assert np.abs(found - expected).min() < 1e-5
+    assert_allclose(np.sort(np.abs(found)), [0, 0, 50, 50], atol=1e-5)
+    assert np.isfinite(largest_stable_step(found))
+
+
+def test_cars_stay_at_rest_below_the_limit_and_not_above_it():
+    """Oracle: the integrator itself, from a start beside equilibrium.
+
+    A stiff damper's motion dies out with a step just below the stated one, and grows beyond any
+    bound with a step that exceeds the linear limit by a tenth.
+    """
+    car = paper_vehicle().with_values(STIFF)
+    row = car_row(car)
+    with pytest.raises(SimulationError, match=r"at most (\S+) ms") as caught:
+        check_free_step(row, np.zeros(4), 0.02)
+    stated = 1e-3 * float(str(caught.value).split("at most ")[1].split()[0])
+
+    def states(step):
+        still = PiecewiseLinear.zero(1.0)
+        jerk = PiecewiseLinear(
+            np.array([0.0, 0.1, 0.1, 1.0]), np.outer([9.0, 9.0, 0.0, 0.0], [0, 0, 1, 1])
+        )
+        inputs = prepare_free(Demand(1.0, 0.0, jerk, still, None), step, 4 * step)
+        return free_states(row[np.newaxis], inputs)
+
+    assert np.abs(states(stated).values[0, -1, 1:8]).max() < 0.01
+    above = states(1.1 * stated / MARGIN)
+    assert above.failed[0] > 0
+
+
+@pytest.mark.parametrize("key", list(reference_vehicles()))
+def test_every_reference_car_takes_the_longest_accepted_step_of_the_page(key):
+    """Oracle: wheel hop of 8 to 15 Hz allows 2.8/95 = 30 ms."""
+    check_free_step(car_row(reference_vehicles()[key]), np.zeros(4), 0.02)
+
+
+def test_a_step_too_long_is_refused_in_every_mode_with_the_longest_one():
+    car = paper_vehicle().with_values(STIFF)
+    bump, heave = reference_manoeuvres()["bump"], reference_manoeuvres()["heave"]
+    sentence = r"step of 2 ms is too long for this car, .* take a step of at most 0\.\d+ ms, or"
+    for simulate, manoeuvre in ((simulate_road, bump), (simulate_posts, heave)):
+        with pytest.raises(SimulationError, match=sentence):
+            simulate(car, replace(manoeuvre, duration=2.0), sample_step=0.01)
+    simulate_road(car, replace(bump, duration=0.2), step=2e-4)
+
+    time = np.linspace(0.0, 1.0, 201)
+    channels = {f"wheel.{corner}.z": 0.0 * time for corner in CORNERS}
+    run = Run("still", time, channels | {"chassis.a_x": 0.0 * time})
+    with pytest.raises(SimulationError, match=r"step of 5 ms is too long .* at most \d\.\d+ ms"):
+        simulate_rims(car, run)
+    simulate_rims(car, run, settings=RimsSettings(step=0.001))
+
+
+def test_brakes_near_standstill_bound_the_step():
+    """Oracle: near v = 0 they are a damper of sum B/(r M v0): 4 * 15 kN m give 1.6e3 1/s."""
+    data = {"kind": "table", "time": [0, 1], "torque": [6e4, 6e4], "front_share": 0.5}
+    stop = manoeuvre_from_json({"name": "t", "kind": "road", "duration": 1, "brake": data})
+    with pytest.raises(SimulationError, match=r"changes at 1\.6\d?e\+03 1/s"):
+        simulate_road(paper_vehicle(), stop)
