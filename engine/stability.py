@@ -81,10 +81,10 @@ def largest_stable_step(values: NDArray[np.complex128]) -> float:
 
     values : eigenvalues, 1/s. A growing one is taken by its frequency alone.
     """
-    values = np.minimum(values.real, 0.0) + 1j * values.imag
-    sizes = np.abs(values)
+    held = np.minimum(values.real, 0.0) + 1j * values.imag
+    sizes = np.abs(held)
     fast = sizes > _ROUNDING * max(sizes.max(), 1.0)
-    z = _RAY * (values[fast] / sizes[fast])[:, np.newaxis]
+    z = _RAY * (held[fast] / sizes[fast])[:, np.newaxis]
     growth = np.abs(1.0 + z * (1.0 + z * (0.5 + z * (1.0 / 6.0 + z / 24.0))))
     limits = _RAY[np.argmax(growth > 1.0 + _ROUNDING, axis=1)]
     return float(np.min(limits / sizes[fast], initial=np.inf))
