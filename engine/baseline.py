@@ -145,14 +145,14 @@ class Baseline:
     """The 7-DOF car's matrices.
 
     jounce : (4, 7), s = jounce @ q
-    rate, damping : (4, 4), suspension forces from s and ds/dt, bars included
+    stiffness, damping : (4, 4), suspension forces from s and ds/dt, bars included
     tyre_stiffness, tyre_damping, wheel_mass : (4,)
     tyres : the car driven at the contact points, n = 7
     rims : the car driven at the wheel centres, n = 3
     """
 
     jounce: NDArray[np.float64]
-    rate: NDArray[np.float64]
+    stiffness: NDArray[np.float64]
     damping: NDArray[np.float64]
     tyre_stiffness: NDArray[np.float64]
     tyre_damping: NDArray[np.float64]
@@ -166,19 +166,19 @@ class Baseline:
         x, y = wheel_positions(vehicle)
         jounce = np.column_stack([-np.ones(4), x, -y, np.eye(4)])
         axles = [vehicle.axle(name) for name in AXLES]
-        rate = np.diag(_each([axle.suspension.stiffness for axle in axles]))
+        stiffness = np.diag(_each([axle.suspension.stiffness for axle in axles]))
         damping = np.diag(_each([axle.suspension.damping for axle in axles]))
         for i, axle in enumerate(axles):
             pair = slice(2 * i, 2 * i + 2)
             difference = np.array([[1.0, -1.0], [-1.0, 1.0]]) / axle.pivot.distance**2
-            rate[pair, pair] += axle.stabilizer_bar.stiffness * difference
+            stiffness[pair, pair] += axle.stabilizer_bar.stiffness * difference
             damping[pair, pair] += axle.stabilizer_bar.damping * difference
         tyre_stiffness = _each([axle.tyre.stiffness for axle in axles])
         tyre_damping = _each([axle.tyre.damping for axle in axles])
         wheel_mass = _each([axle.wheel.mass for axle in axles])
         inertia = vehicle.chassis.inertia
         mass = np.diag([vehicle.chassis.mass, inertia.yy, inertia.xx, *wheel_mass])
-        k, c = jounce.T @ rate @ jounce, jounce.T @ damping @ jounce
+        k, c = jounce.T @ stiffness @ jounce, jounce.T @ damping @ jounce
         rims = LinearSystem(
             mass=mass[CHASSIS, CHASSIS],
             damping=c[CHASSIS, CHASSIS],
@@ -194,7 +194,9 @@ class Baseline:
             input_stiffness=on_wheels * tyre_stiffness,
             input_damping=on_wheels * tyre_damping,
         )
-        return cls(jounce, rate, damping, tyre_stiffness, tyre_damping, wheel_mass, tyres, rims)
+        return cls(
+            jounce, stiffness, damping, tyre_stiffness, tyre_damping, wheel_mass, tyres, rims
+        )
 
 
 def wheel_positions(vehicle: Vehicle) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -258,7 +260,7 @@ def simulate_rims(
     rate = np.hstack([rate_spline(time), u_rate])
     acceleration = np.hstack([rate_spline(time, 1), u_acceleration])
     channels = _channels(vehicle, baseline, Motion(q, rate, acceleration), points)
-    force = q @ baseline.jounce.T @ baseline.rate + rate @ baseline.jounce.T @ baseline.damping
+    force = q @ baseline.jounce.T @ baseline.stiffness + rate @ baseline.jounce.T @ baseline.damping
     channels |= _loads(vehicle, force + baseline.wheel_mass * u_acceleration)
     return Run(NAME, time, channels)
 

@@ -13,8 +13,8 @@ begin, middle and end of each of its steps; this module makes them, in this orde
 4. The braking weight b(t) of `braking`.
 
 The filter is `filters.low_pass`. Nodes are uniform over the record, their step the longest that
-divides it and does not exceed `step`. Where the samples do not fall on nodes, the model's output
-is carried to them by cubic Hermite interpolation from its states and rates.
+divides it and does not exceed `step`. Where the samples do not fall on nodes, the model's z, pitch
+and roll are carried to them by cubic Hermite interpolation from their values and rates.
 """
 
 import math

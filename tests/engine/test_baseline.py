@@ -79,7 +79,7 @@ def test_heave_of_a_car_without_pitch_coupling_is_a_quarter_car():
 def test_a_bar_acts_on_the_wheels_as_its_rate_over_d_squared():
     """Oracle: force 2 Ktor/d^2 s on each wheel, opposite, when one axle's wheels go +-s."""
     baseline = Baseline.of(paper_vehicle())
-    bar = baseline.rate - np.diag([24000.0, 24000.0, 27000.0, 27000.0])
+    bar = baseline.stiffness - np.diag([24000.0, 24000.0, 27000.0, 27000.0])
     force = bar @ np.array([0.01, -0.01, 0.0, 0.0])
     assert_allclose(force, 2 * 22000.0 / 1.6**2 * np.array([0.01, -0.01, 0, 0]), atol=1e-9)
     assert_allclose(bar @ np.array([0.01, 0.01, -0.02, -0.02]), 0.0, atol=1e-12)
