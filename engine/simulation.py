@@ -281,6 +281,8 @@ def _check_speed(run: Run) -> None:
 
 def _road_warnings(road: Road, vehicle: Vehicle, run: Run) -> tuple[str, ...]:
     """Where the front wheels are on no profile; before and after it the ground is level."""
+    if np.ptp(road.left) == 0.0 and np.ptp(road.right) == 0.0:
+        return ()
     warnings, name = [], road.name or "given"
     standing = vehicle.front.cg_distance
     front = standing + run["chassis.x"]

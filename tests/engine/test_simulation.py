@@ -251,10 +251,10 @@ def test_posts_with_gaps_are_refused(car):
 def test_leaving_a_given_road_is_told_with_place_and_time(car, model):
     """Oracle: at 20 m/s the front wheels, 1.30 m ahead, pass X = 31.28 m at 1.499 s."""
     drive = replace(reference_manoeuvres()["constant-speed-c"], duration=3.0)
-    level = np.zeros(31)
+    rough = 0.001 * (np.arange(31) % 2)
 
     def warnings(start, spacing):
-        road = Road(start, spacing, level, level, name="r.csv")
+        road = Road(start, spacing, rough, 0.0 * rough, name="r.csv")
         return simulate_road(car, drive, road=road, model=model).warnings
 
     [short] = warnings(1.28, 1.0)
@@ -264,7 +264,8 @@ def test_leaving_a_given_road_is_told_with_place_and_time(car, model):
     [displaced] = warnings(20.0, 2.0)
     assert "begins at X = 20.00 m, ahead of the front wheels, which start at 1.30 m" in displaced
     assert len(warnings(1000.0, 1.0)) == 1
-    assert simulate_road(car, drive, model=model).warnings == ()
+    for ground in (None, Road.flat()):
+        assert simulate_road(car, drive, road=ground, model=model).warnings == ()
 
 
 def test_a_given_road_spares_building_the_manoeuvre_s_own(car):
