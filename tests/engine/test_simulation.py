@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from ridetune.engine.car_rows import car_rows
 from ridetune.engine.channels import Run
+from ridetune.engine.curves import smooth_step
 from ridetune.engine.errors import RoadError, SimulationDiverged, SimulationError
 from ridetune.engine.frames import AXLES, CORNERS, GRAVITY
 from ridetune.engine.integration import free_states
@@ -245,6 +246,19 @@ def test_posts_with_gaps_are_refused(car):
     posts["post.rl.z"] = np.where(time == 0.5, np.nan, 0.0)
     with pytest.raises(SimulationError, match=r"gaps \(not a number\) in post\.rl\.z; cut"):
         simulate_posts(car, Run("holed", time, posts))
+
+
+def test_a_grade_takes_no_speed(car):
+    """Oracle: docs/model.md; without rolling resistance no force acts along X, so the speed at the
+    top of a 5 % grade of 40 m, with the car at rest on its springs again, is that at its foot."""
+    free = {f"{axle}.tyre.rolling_resistance": 0.0 for axle in AXLES}
+    x = np.arange(0.0, 80.0, 0.5)
+    ramp = 0.05 * 40.0 * smooth_step((x - 10.0) / 40.0)
+    rolling = replace(reference_manoeuvres()["coast"], duration=9.0, initial_speed=10.0)
+    road = Road(0.0, 0.5, ramp, ramp)
+    run = simulate_road(car.with_values(free), rolling, road=road).run
+    assert run["chassis.z"][-1] == pytest.approx(2.0, abs=1e-4)
+    assert run["chassis.v_x"][-1] == pytest.approx(10.0, abs=1e-6)
 
 
 @pytest.mark.parametrize("model", ["8dof", "7dof"])
