@@ -48,7 +48,8 @@ AT_BOUND = 1e-3
 
 
 SCATTERED_STARTS = 32
-"""Cars tried around start values that do not carry the car through the runs."""
+"""Cars tried around start values that do not carry the car through the runs; if all fail, as many
+between the bounds."""
 
 MUCH_BETTER = 0.5
 """Such a car is taken when its squared residuals are below this share of the start's."""
@@ -189,7 +190,7 @@ def _usable_start(residuals: Residuals, x: Array) -> tuple[Array, list[str]]:
     Start values from which the model fails, or is further from the runs than their mean, can
     lie where the car falls over into another equilibrium, from which no small step leads out.
     Unless a channel of wrong sign or unit is the reason, a Halton sequence of cars around them is
-    tried and the best taken, if it is much better.
+    tried and the best taken, if it is much better; if all of them fail, one between the bounds.
     Raises ProblemError when the model fails on every one.
     """
     r = residuals.vector(x)
@@ -201,20 +202,23 @@ def _usable_start(residuals: Residuals, x: Array) -> tuple[Array, list[str]]:
         if channel_faults(residuals.problem.runs, start, start):
             return x, []
     reach = np.where([one.logarithmic for one in residuals.problem.free], 1.0, 2.0)
-    lower = np.maximum(residuals.lower, x - reach)
-    upper = np.minimum(residuals.upper, x + reach)
-    spread = Halton(len(x), scramble=False).random(SCATTERED_STARTS)
-    trials = [lower + (upper - lower) * share for share in spread]
-    squares = residuals.squares(trials)
-    best = int(np.argmin(squares))
-    if squares[best] < MUCH_BETTER * float(r @ r):
-        return trials[best], [
-            "The start values do not carry the car through the runs, so the fit began from others "
-            "near them; check the start values."
-        ]
-    if failed:
-        raise ProblemError(_failure(residuals.problem))
-    return x, []
+    near = np.maximum(residuals.lower, x - reach), np.minimum(residuals.upper, x + reach)
+    for where, (lower, upper) in (
+        ("near them", near),
+        ("between the bounds", (residuals.lower, residuals.upper)),
+    ):
+        spread = Halton(len(x), scramble=False).random(SCATTERED_STARTS)
+        trials = [lower + (upper - lower) * share for share in spread]
+        squares = residuals.squares(trials)
+        best = int(np.argmin(squares))
+        if squares[best] < MUCH_BETTER * float(r @ r):
+            return trials[best], [
+                "The start values do not carry the car through the runs, so the fit began from "
+                f"others {where}; check the start values."
+            ]
+        if not failed:
+            return x, []
+    raise ProblemError(_failure(residuals.problem))
 
 
 def _failure(problem: Problem) -> str:
@@ -226,7 +230,7 @@ def _failure(problem: Problem) -> str:
     }
     place = max(furthest, key=lambda name: furthest[name])
     return (
-        f"The model fails at the start values and around them ({place} reaches "
+        f"The model fails at the start values and wherever else it was tried ({place} reaches "
         f"{1e3 * furthest[place]:.0f} mm); check the units of the runs, the car's known data and "
         "the start values."
     )
