@@ -2,11 +2,18 @@
 
 from argparse import Namespace
 from dataclasses import replace
+from typing import Any
 
 from ...engine.errors import SimulationError
 from ...engine.measurement import read_run, run_to_csv
 from ...engine.road_file import read_road
-from ...engine.simulation import Simulation, simulate_posts, simulate_rims, simulate_road
+from ...engine.simulation import (
+    FREE_STEP,
+    Simulation,
+    simulate_posts,
+    simulate_rims,
+    simulate_road,
+)
 from .inputs import find_manoeuvre, find_vehicle, rims_settings, with_braking
 from .output import print_fit_percent, print_warnings, require_place, write_file
 
@@ -55,28 +62,31 @@ def _road(options: Namespace) -> Simulation:
     if manoeuvre.kind == "posts":
         if options.road:
             raise SimulationError(f"{manoeuvre.name} moves the posts of a rig; leave out --road.")
-        return simulate_posts(vehicle, manoeuvre, model=options.model, lift_off=options.lift_off)
+        return simulate_posts(vehicle, manoeuvre, **_how(options))
     road = read_road(options.road) if options.road else None
-    return simulate_road(
-        vehicle, manoeuvre, road=road, model=options.model, lift_off=options.lift_off
-    )
+    return simulate_road(vehicle, manoeuvre, road=road, **_how(options))
 
 
 def _rims(options: Namespace) -> Simulation:
     [run] = with_braking([read_run(options.rims)], options.braking)
+    settings = rims_settings(options)
+    if options.step is not None:
+        settings = replace(settings, step=options.step)
     return simulate_rims(
         find_vehicle(options.vehicle),
         run,
         traction=options.traction or "exact",
-        settings=rims_settings(options),
+        settings=settings,
         model=options.model,
     )
 
 
 def _posts(options: Namespace) -> Simulation:
-    return simulate_posts(
-        find_vehicle(options.vehicle),
-        read_run(options.posts),
-        model=options.model,
-        lift_off=options.lift_off,
-    )
+    vehicle = find_vehicle(options.vehicle)
+    return simulate_posts(vehicle, read_run(options.posts), **_how(options))
+
+
+def _how(options: Namespace) -> dict[str, Any]:
+    """What road and posts modes have in common."""
+    step = FREE_STEP if options.step is None else options.step
+    return {"model": options.model, "lift_off": options.lift_off, "step": step}

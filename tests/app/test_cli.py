@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -13,7 +14,7 @@ from numpy.testing import assert_allclose
 from ridetune.app.cli import main
 from ridetune.engine.channels import Run
 from ridetune.engine.measurement import read_run, write_run
-from ridetune.engine.vehicle_file import read_vehicle, reference_vehicles
+from ridetune.engine.vehicle_file import read_vehicle, reference_vehicles, write_vehicle
 
 SHORT = {
     "name": "A short start over a rough road",
@@ -180,6 +181,20 @@ def test_rims_of_a_direct_run_bring_its_body_motion_back(folder, driven, capsys)
     printed = dict(row.split() for row in rows if len(row.split()) == 2)
     assert min(float(printed[name]) for name in RECORDED[:3]) > 99.0
     assert_allclose(read_run(folder / "r.csv").time, read_run(driven).time)
+
+
+def test_a_step_too_long_for_the_car_is_refused_with_one_that_it_takes(folder, driven, capsys):
+    """Oracle: the step that the refusal states is taken, in a mode with tyres and on rims."""
+    car = reference_vehicles()["paper"].with_values({"front.suspension.damping": 9e5})
+    write_vehicle(car, "stiff.json")
+    flat = {"name": "still", "kind": "road", "duration": 0.1}
+    (folder / "still.json").write_text(json.dumps(flat))
+    for mode in (("--manoeuvre", "still.json", "-o", "r.csv"), ("--rims", str(driven))):
+        command = ("simulate", "--vehicle", "stiff.json", *mode)
+        message = refused(capsys, *command)
+        longest = re.search(r"take a step of at most (\S+) ms", message)[1]
+        assert main([*command, "--step", str(float(longest) / 1000.0)]) == 0
+        assert "0.02" in refused(capsys, *command, "--step", "0.5")
 
 
 def test_both_tractions_and_both_models_follow_rims(driven, capsys):
