@@ -12,6 +12,7 @@ from fastapi import APIRouter
 
 from ..engine.channels import CHANNELS
 from ..engine.parameters import PARAMETERS
+from ..engine.vehicle import numbers
 from ..engine.vehicle_file import reference_vehicles, vehicle_to_json
 from .errors import NotFound
 from .schemas import RimsSettingsForm, RoadPreview
@@ -22,8 +23,12 @@ router = APIRouter(prefix="/api", tags=["catalogue"], route_class=StrictRoute)
 
 @router.get("/parameters")
 def parameters() -> list[dict[str, Any]]:
-    """The twelve parameters of an identification and their sliders, SI."""
-    return [asdict(parameter) for parameter in PARAMETERS]
+    """The twelve parameters of an identification, their sliders and what is accepted, SI."""
+    accepted = {row.name: numbers()[row.name] for row in PARAMETERS}
+    return [
+        {**asdict(row), "lower": accepted[row.name].lower, "upper": accepted[row.name].upper}
+        for row in PARAMETERS
+    ]
 
 
 @router.get("/channels")

@@ -4,6 +4,7 @@
 // lie the baseline (a tick) and, after a fit, the 95 % interval of the identified value (a band).
 
 import { $, capital, h, symbol } from "./dom.js";
+import { notice } from "./notices.js";
 import { get, on, set } from "./store.js";
 import * as units from "./units.js";
 
@@ -78,6 +79,19 @@ function row(parameter, side) {
   const change = (shown) => {
     if (Number.isFinite(shown)) set({ values: { ...get("values"), [name]: shown / factor } });
   };
+  const accepted = [parameter.lower * factor, parameter.upper * factor];
+  const isAccepted = (shown) => shown >= accepted[0] && shown <= accepted[1];
+  const typed = () => {
+    if (field.value !== "" && isAccepted(Number(field.value))) change(Number(field.value));
+  };
+  const left = () => {
+    if (field.value !== "" && !isAccepted(Number(field.value))) {
+      const [from, to] = accepted.map((x) => units.number(x));
+      notice("warning", `${parameter.label} stays as it was`,
+        `${field.value} ${unit} is not accepted; give ${from} to ${to} ${unit}.`);
+    }
+    show();
+  };
   const slider = h("input", {
     type: "range", id: `slider-${id}`, min: lower, max: upper, step: "any",
     "aria-label": `${parameter.label}, ${unit}`,
@@ -92,8 +106,8 @@ function row(parameter, side) {
   const field = h("input", {
     type: "number", id: `value-${id}`, step: "any", inputMode: "decimal",
     on: {
-      input: () => field.value !== "" && change(Number(field.value)),
-      change: show,
+      input: typed,
+      change: left,
     },
   });
   const parts = {
@@ -150,21 +164,26 @@ function show() {
     };
     slider.value = shown;
     slider.setAttribute("aria-valuetext", `${units.number(shown)} ${parameter.display_unit}`);
-    if (document.activeElement !== field) field.value = units.plain(shown);
+    if (document.activeElement !== field) field.value = units.short(shown);
+    const outside = shown < lower || shown > upper;
+    field.title = outside
+      ? `Beyond the slider, which goes from ${units.number(lower)} to ${units.number(upper)} ` +
+        parameter.display_unit : "";
     const moved = Math.abs(shown - start) > 1e-9 * Math.max(1, Math.abs(start));
     changed += moved;
     parts.element.classList.toggle("moved", moved);
-    parts.element.classList.toggle("outside", shown < lower || shown > upper);
+    parts.element.classList.toggle("outside", outside);
     parts.reset.title = `Back to the baseline, ${units.number(start)} ${parameter.display_unit}`;
     parts.reset.disabled = !moved;
     parts.baseline.style.left = at(start);
-    band(parts, estimates.get(name), factor, at);
+    band(parts, estimates.get(name), factor, at, shown);
   }
   $("#reset-all").disabled = changed === 0;
   $("#set-baseline").disabled = changed === 0;
 }
 
-function band(parts, estimate, factor, at) {
+/** The fit's interval on the track; beside it ± where the slider holds the fit, else its value. */
+function band(parts, estimate, factor, at, shown) {
   const { interval, spread, parameter } = parts;
   const known = isBounded(estimate?.confidence_interval);
   interval.hidden = !known;
@@ -180,7 +199,9 @@ function band(parts, estimate, factor, at) {
   interval.className = `interval ${estimate.determined}`;
   const half = (high - low) / 2;
   const value = estimate.value * factor;
-  spread.textContent = half > Math.abs(value) ? "± >100 %" : `± ${units.number(half, 2)}`;
+  const holds = Math.abs(shown - value) <= 1e-6 * Math.abs(value);
+  spread.textContent = !holds ? `fit ${units.number(value, 3)}`
+    : half > Math.abs(value) ? "± >100 %" : `± ${units.number(half, 2)}`;
   spread.className = `spread ${estimate.determined}`;
   spread.title =
     `Identified ${units.number(value)} ${parameter.display_unit}, 95 % interval ` +

@@ -25,6 +25,7 @@ import * as units from "./units.js";
 
 const RETRY = 1500;
 const SAVE_AFTER = 400;
+const LOW_WINDOW = 850;
 
 const sid = location.pathname.split("/")[2];
 let unsaved = false;
@@ -207,7 +208,8 @@ function splitter() {
     event.preventDefault();
     put(Number(bar.getAttribute("aria-valuenow")) + step);
   });
-  put(54);
+  // A low window has no room for both: the twelve rows of a fit go before the view.
+  put(window.innerHeight < LOW_WINDOW ? 42 : 54);
 }
 
 function help() {

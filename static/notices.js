@@ -1,6 +1,7 @@
 // Messages for a person: what the service said, word for word, and what can be done.
 
 import { $, h } from "./dom.js";
+import { worded } from "./wording.js";
 
 const KEPT = { info: 6000, warning: 15000 };
 
@@ -10,7 +11,7 @@ export function notice(kind, title, text = "", action = null) {
     "div",
     { className: `notice ${kind}`, role: kind === "error" ? "alert" : "status" },
     h("strong", {}, title),
-    text ? h("p", {}, text) : null,
+    text ? h("p", {}, worded(text)) : null,
     action
       ? h("button", { type: "button", on: { click: () => { action.run(); box.remove(); } } },
           action.label)

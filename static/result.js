@@ -6,6 +6,7 @@ import { costChart } from "./cost.js";
 import { $, breakable, fileName, h, saveFile, symbol } from "./dom.js";
 import { get } from "./store.js";
 import * as units from "./units.js";
+import { worded } from "./wording.js";
 
 const WELL = { yes: "well", weakly: "weakly", no: "not" };
 const STATES = {
@@ -34,7 +35,7 @@ export function view(job, holdouts, apply) {
       h("p", { className: `outcome ${job.state}`, id: "outcome" }, outcome(job)),
       estimates(result),
       result.warnings.length
-        ? h("ul", { className: "warnings" }, result.warnings.map((text) => h("li", {}, text)))
+        ? h("ul", { className: "warnings" }, result.warnings.map((text) => h("li", {}, worded(text))))
         : null),
     h("div", { className: "fit-side scrolls" },
       h("button", { type: "button", id: "apply", className: "primary wide",
@@ -52,7 +53,7 @@ function running(job) {
     h("div", { className: "fit-main scrolls" },
       h("p", { className: `outcome ${job.state}`, id: "outcome" }, outcome(job)),
       job.error ? h("div", { className: "problem", role: "alert" },
-        h("strong", {}, "The identification failed"), h("p", {}, job.error.detail)) : null,
+        h("strong", {}, "The identification failed"), h("p", {}, worded(job.error.detail))) : null,
       h("h3", {}, "Cost"), cost.element, h("p", { className: "hint", id: "cost-now" })),
     h("div", { className: "fit-side scrolls" }, h("h3", {}, "Best so far"),
       h("table", { className: "best" }, h("tbody", { id: "best" }))));
@@ -97,7 +98,8 @@ function estimates(result) {
           h("span", { className: "soft long" }, row.label)),
         h("td", { className: "strong" }, units.number(estimate.value * factor)),
         h("td", { className: "unit" }, row.display_unit),
-        h("td", { className: "span" }, isBounded(interval)
+        h("td", { className: "span", title: `Searched from ${units.number(estimate.lower * factor)} ` +
+            `to ${units.number(estimate.upper * factor)} ${row.display_unit}` }, isBounded(interval)
           ? `${units.number(interval[0] * factor, 3)} … ${units.number(interval[1] * factor, 3)}`
           : "unbounded"),
         h("td", { className: "soft long" }, units.number(estimate.start * factor)),

@@ -39,7 +39,10 @@ export function view(redraw) {
       h("table", { className: "free" },
         h("thead", {}, h("tr", {}, ["Free", "Parameter", "Start", "Lower", "Upper", "Unit"].map((text) =>
           h("th", { scope: "col" }, text)))),
-        h("tbody", {}, get("parameters").map((parameter) => freeRow(parameter, redraw))))));
+        h("tbody", {}, get("parameters").map((parameter) => freeRow(parameter, redraw)))),
+      h("p", { className: "hint" },
+        "The fit starts from the sliders and searches between the bounds. Bounds you do not type " +
+        "follow the start: 0.05 to 8 times a stiffness or damping.")));
 }
 
 function runRow(run, redraw) {
@@ -101,7 +104,8 @@ function freeRow(parameter, redraw) {
 
 /** The service's default bounds, shown before the fit; it applies its own when none is changed. */
 function defaultBounds(parameter, start) {
-  if (parameter.name.endsWith("pivot.angle")) return [-0.3, 1.3];
-  if (parameter.name.endsWith("pivot.distance")) return start < 0 ? [-10, -0.1] : [0.1, 10];
-  return [0.05 * start, 8 * start];
+  const [lower, upper] = parameter.name.endsWith("pivot.angle") ? [-0.3, 1.3]
+    : parameter.name.endsWith("pivot.distance") ? (start < 0 ? [-10, -0.1] : [0.1, 10])
+      : [0.05 * start, 8 * start];
+  return [Math.max(lower, parameter.lower), Math.min(upper, parameter.upper)];
 }

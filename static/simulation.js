@@ -7,6 +7,7 @@ import { withValues } from "./controls.js";
 import { POSE_CHANNELS } from "./poses.js";
 import { rimsOf } from "./preparation.js";
 import { get, set } from "./store.js";
+import { worded } from "./wording.js";
 
 const MOST_SAMPLES = 2001;
 const MEASURED_SAMPLES = 4001;
@@ -131,6 +132,6 @@ async function retried(name, work) {
 function failed(error) {
   const box = $("#chart-note");
   box.hidden = !error;
-  box.textContent = error ? error.message : "";
+  box.replaceChildren(...(error ? worded(error.message) : []));
   set({ trouble: error });
 }

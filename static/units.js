@@ -51,6 +51,12 @@ export function plain(value, digits = 5) {
   return Number.isFinite(value) ? String(Number(value.toPrecision(digits))) : "";
 }
 
+/** A number for a field seven characters wide. */
+export function short(value) {
+  const digits = [5, 4, 3].find((count) => plain(value, count).length <= 7) ?? 3;
+  return plain(value, digits);
+}
+
 const minus = (text) => text.replace("-", "−");
 
 /** Units of a vehicle's known data by the last word of their path. */

@@ -14,6 +14,8 @@ def test_the_tables_are_the_engines(client):
     parameters = client.get("/api/parameters").json()
     assert [row["name"] for row in parameters] == list(PARAMETER_NAMES)
     assert all(row["slider_lower"] < row["slider_upper"] for row in parameters)
+    assert all(row["lower"] <= row["slider_lower"] for row in parameters)
+    assert all(row["slider_upper"] <= row["upper"] for row in parameters)
     channels = client.get("/api/channels").json()
     assert [row["name"] for row in channels] == list(CHANNELS)
     pitch = next(row for row in channels if row["name"] == "chassis.pitch")

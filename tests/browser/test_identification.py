@@ -31,7 +31,14 @@ def test_a_newcomer_identifies_the_sample_car_and_applies_it(visitor):
     visitor.click("#identify")
     visitor.until("ridetune.state('fit') !== null", 150)
     assert visitor.element("#identification").is_visible()
-    assert len(visitor.element(".estimates tbody tr").all()) == 12
+    estimates = visitor.element(".estimates tbody tr").all()
+    assert len(estimates) == 12
+    lowest = estimates[-1].bounding_box()
+    assert lowest["y"] + lowest["height"] <= 768, "all twelve rows are in sight"
+    # Warnings speak of symbols and of the sliders' units.
+    warnings = visitor.element(".warnings").inner_text()
+    assert "is at its upper bound, 2094 N m/deg" in warnings
+    assert "stabilizer_bar" not in warnings
 
     visitor.click("#apply")
     visitor.settled()
@@ -47,6 +54,16 @@ def test_a_newcomer_identifies_the_sample_car_and_applies_it(visitor):
     visitor.wait(
         lambda: "…" not in visitor.element(".held-out").inner_text(), "the held-out run is scored"
     )
+
+    # Only a slider that holds the fit has its error beside it.
+    field = visitor.element("#value-front-suspension-stiffness")
+    field.fill("30")
+    field.blur()
+    spread = visitor.element("[data-name='front.suspension.stiffness'] .spread")
+    assert spread.inner_text() == f"fit {identified / 1000:.1f}"
+    visitor.click("#apply")
+    assert spread.inner_text().startswith("±")
+    assert visitor.value("front.suspension.stiffness") == identified
 
     # What was found is still there when the page is opened again.
     visitor.wait(lambda: not visitor.look("ridetune.unsaved()"), "the sliders are saved")

@@ -301,3 +301,17 @@ def test_the_page_goes_on_when_the_service_has_been_away(visit, tmp_path):
         assert kept["vehicle"]["front"]["suspension"]["stiffness"] == pytest.approx(23e3)
     finally:
         service.stop()
+
+
+def test_a_number_no_car_can_have_is_refused_in_place(visitor):
+    """The old value stays; the message covers no slider."""
+    before = visitor.value("front.suspension.stiffness")
+    field = visitor.element("#value-front-suspension-stiffness")
+    field.fill("50000000")
+    field.blur()
+    notice = visitor.element(".notice.warning")
+    assert "50000000 N/mm is not accepted; give 0.1000 to 10000 N/mm" in notice.inner_text()
+    assert visitor.value("front.suspension.stiffness") == before
+    assert float(field.input_value()) == before / 1000
+    parameters = visitor.element("#parameters").bounding_box()
+    assert notice.bounding_box()["x"] >= parameters["x"] + parameters["width"]
