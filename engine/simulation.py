@@ -97,7 +97,7 @@ def simulate_road(
     )
     if road is None:
         return found
-    return replace(found, warnings=_road_warnings(road, vehicle, found.run))
+    return replace(found, warnings=(*found.warnings, *_road_warnings(road, vehicle, found.run)))
 
 
 def simulate_posts(
@@ -146,7 +146,10 @@ def simulate_rims(
     _require_choice("model", model, Model)
     settings = settings or RimsSettings()
     inputs = prepare(run, vehicle, settings)
+    ignored: tuple[str, ...] = ()
     if model == "7dof":
+        if traction != "exact":
+            ignored = ("The 7-DOF model has no longitudinal motion: traction is ignored.",)
         heights = np.column_stack([run[name] for name in WHEEL_CHANNELS])
         heights = smoothed(run.time, heights, settings.rim_cutoff_hz)
         result = replace(baseline.simulate_rims(vehicle, run.time, heights, points), name=run.name)
@@ -158,7 +161,7 @@ def simulate_rims(
         _load_shares(result),
         inputs.node_time.size - 1,
         _fit_percent(result, run, settings),
-        inputs.warnings,
+        (*inputs.warnings, *ignored),
     )
 
 
@@ -200,7 +203,14 @@ def _free(
             result = baseline.simulate_road(vehicle, demand, sample_step, points)
         result = replace(result, name=name)
         _check_speed(result)
-        return Simulation(mode, result, _load_shares(result), inputs.steps.size)
+        ignored = ("The 7-DOF model's tyres never lift off: lift_off is ignored.",)
+        return Simulation(
+            mode,
+            result,
+            _load_shares(result),
+            inputs.steps.size,
+            warnings=ignored if lift_off else (),
+        )
     car = car_row(vehicle, lift_off)
     check_free_step(car, demand.brake.values.max(axis=0), float(inputs.steps.max()))
     states = free_states(car[np.newaxis], inputs)

@@ -240,6 +240,17 @@ def test_a_misspelt_choice_is_refused_with_the_choices(car, driven, short_drive)
             simulate(car, motion, model="7DOF")
 
 
+def test_what_the_seven_dof_model_ignores_is_told(car, driven, short_drive):
+    """Oracle: the same run, but for the sentence."""
+    plain = simulate_road(car, short_drive, model="7dof")
+    lifted = simulate_road(car, short_drive, model="7dof", lift_off=True)
+    assert plain.warnings == ()
+    assert "lift_off is ignored" in lifted.warnings[0]
+    assert_allclose(lifted.run["chassis.z"], plain.run["chassis.z"], rtol=0, atol=0)
+    paper = simulate_rims(car, driven, model="7dof", traction="paper").warnings
+    assert "traction is ignored" in paper[-1]
+
+
 def test_posts_with_gaps_are_refused(car):
     time = np.linspace(0.0, 1.0, 101)
     posts = {f"post.{corner}.z": np.zeros(time.size) for corner in CORNERS}
