@@ -50,7 +50,7 @@
   };
 
   // The page's own keys work while the 3D view has the focus; the camera keeps W A S D Q E.
-  const passed = new Set([" ", "ArrowLeft", "ArrowRight", "Home", "End", "?"]);
+  const passed = new Set([" ", "ArrowLeft", "ArrowRight", "Home", "End", "?", "Escape"]);
   document.addEventListener(
     "keydown",
     (event) => {

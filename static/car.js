@@ -10,8 +10,11 @@ import * as units from "./units.js";
 const GROUPS = [["chassis", "Sprung mass"], ["front", "Front axle"], ["rear", "Rear axle"],
   ["brakes", "Brakes"]];
 
+/** A field of the panel is being changed: it must not be built anew under the hand. */
+let own = false;
+
 export function build() {
-  on("vehicle", show);
+  on("vehicle", () => own || show());
   show();
 }
 
@@ -70,24 +73,29 @@ function leaves(part, path) {
 
 function entry(vehicle, path) {
   const { unit, label } = units.known(path);
-  const [, part] = path.split(".");
-  const where = { wheel: "wheel ", tyre: "tyre " }[part] ?? "";
   const field = h("input", {
     type: "number", step: "any", value: units.plain(valueAt(vehicle, path), 6),
-    on: { change: () => change(path, Number(field.value), field) },
+    on: { change: () => change(path, field) },
   });
   return h("label", { className: "known-row", title: path },
-    h("span", {}, label.startsWith(where.trim()) ? label : where + label), field,
+    h("span", {}, label), field,
     h("span", { className: "unit" }, unit));
 }
 
-async function change(path, value, field) {
+async function change(path, field) {
+  const value = field.value === "" ? NaN : Number(field.value);
+  if (!Number.isFinite(value)) {
+    field.value = units.plain(valueAt(get("vehicle"), path), 6);
+    return;
+  }
   const vehicle = withValues(get("vehicle"), { ...get("values"), [path]: value });
   const baseline = withValues(get("baseline"), { [path]: value });
   try {
     await api.saveVehicle(vehicle);
     await api.saveBaseline(baseline);
+    own = true;
     set({ vehicle, baseline });
+    own = false;
   } catch (error) {
     if (error.lost) set({ online: false });
     refused(error, "Changing the car");

@@ -66,7 +66,7 @@ export function build(changed) {
     onGroup();
   });
   onGroup = changed;
-  on("now reference measured", fill);
+  on("now reference measured trouble", fill);
   on("compare ride", legend);
   onTime(cursor);
   new ResizeObserver(debounced(resize, 60)).observe($("#chart-area"));
@@ -170,8 +170,10 @@ function fill() {
     const channel = name.replace(SPECTRUM, "");
     const data = runs.map((run) => run?.values[channel] ?? null);
     const empty = box.querySelector(".chart-empty");
-    empty.hidden = !base || data.some(Boolean);
-    empty.textContent = "Not in this ride.";
+    const nothing = !data.some(Boolean) && Boolean(base ?? get("trouble"));
+    empty.hidden = !nothing;
+    empty.textContent = base ? "Not in this ride." : "Not simulated.";
+    box.classList.toggle("nothing", nothing);
     if (spectrum) {
       fillSpectrum(entry, runs, channel);
       continue;
@@ -277,10 +279,10 @@ function cursor() {
 function readings() {
   const t = hover ?? clock.time;
   for (const { plot, values, spectrum } of charts) {
-    if (spectrum || !plot.data[0].length) continue;
+    if (spectrum) continue;
     const { min, max } = plot.scales.y;
     const decimals = Math.min(Math.max(Math.round(2.6 - Math.log10(max - min || 1)), 0), 6);
-    const [i, w] = locate(plot.data[0], t);
+    const [i, w] = plot.data[0].length ? locate(plot.data[0], t) : [0, 0];
     values.forEach((element, k) => {
       const value = plot.data[k + 1]?.[w > 0.5 ? i + 1 : i];
       const text = value === null || value === undefined ? "" : units.fixed(value, decimals);

@@ -6,6 +6,7 @@ import { refused } from "./notices.js";
 import { ofRide } from "./simulation.js";
 import { get, on, set } from "./store.js";
 import * as units from "./units.js";
+import { worded } from "./wording.js";
 
 const SAME = 0.001;
 
@@ -24,7 +25,7 @@ export function build() {
     h("button", { type: "button", id: "save-run",
       title: "Every channel of the simulated ride as a measurement file", on: { click: save } },
       "Save run as CSV")));
-  on("now reference measured compare", show);
+  on("now reference measured compare trouble", show);
   show();
 }
 
@@ -34,7 +35,7 @@ function show() {
   lift.hidden = now?.mode === "rims";
   if (!now) {
     table.replaceChildren(h("p", { className: "empty" },
-      get("trouble")?.message ?? "The numbers come with the first simulation."));
+      worded(get("trouble")?.message ?? "The numbers come with the first simulation.")));
     return;
   }
   const name = get("compare") === "7dof" ? "7-DOF model" : "Baseline";
@@ -110,5 +111,5 @@ function warnings(now) {
     texts.push(`A tyre pulls on the road during ${units.number(100 * share, 2)} % of the time: ` +
       "a real wheel would leave it there.");
   }
-  return texts.length ? h("ul", { className: "warnings" }, texts.map((t) => h("li", {}, t))) : null;
+  return texts.length ? h("ul", { className: "warnings" }, texts.map((t) => h("li", {}, worded(t)))) : null;
 }

@@ -64,6 +64,9 @@ export function build({ onBaseline }) {
     h("p", { className: "track-legend" },
       h("span", { className: "mark-baseline" }, "baseline"),
       h("span", { className: "mark-interval" }, "95 % interval of the fit")),
+    h("p", { className: "track-legend", id: "interval-legend", hidden: true },
+      Object.entries(DETERMINED).map(([verdict, text]) =>
+        h("span", { className: `mark-interval ${verdict}` }, text.replace(" determined", "")))),
   );
   on("values baseline fit", show);
   show();
@@ -79,18 +82,16 @@ function row(parameter, side) {
   const change = (shown) => {
     if (Number.isFinite(shown)) set({ values: { ...get("values"), [name]: shown / factor } });
   };
-  const accepted = [parameter.lower * factor, parameter.upper * factor];
-  const isAccepted = (shown) => shown >= accepted[0] && shown <= accepted[1];
+  const before = { value: 0 };
+  const isAccepted = (shown) => shown >= parameter.lower * factor && shown <= parameter.upper * factor;
   const typed = () => {
     if (field.value !== "" && isAccepted(Number(field.value))) change(Number(field.value));
   };
   const left = () => {
-    if (field.value !== "" && !isAccepted(Number(field.value))) {
-      const [from, to] = accepted.map((x) => units.number(x));
-      notice("warning", `${parameter.label} stays as it was`,
-        `${field.value} ${unit} is not accepted; give ${from} to ${to} ${unit}.`);
-    }
-    show();
+    if (field.value !== "" && !isAccepted(Number(field.value))) refuse(parameter, field.value, before);
+    else if (get("values")[name] !== before.value) tellBeyond(parameter);
+    field.value = units.short(get("values")[name] * factor);
+    before.value = get("values")[name];
   };
   const slider = h("input", {
     type: "range", id: `slider-${id}`, min: lower, max: upper, step: "any",
@@ -106,8 +107,10 @@ function row(parameter, side) {
   const field = h("input", {
     type: "number", id: `value-${id}`, step: "any", inputMode: "decimal",
     on: {
+      focus: () => { before.value = get("values")[name]; },
       input: typed,
       change: left,
+      blur: show,
     },
   });
   const parts = {
@@ -130,6 +133,26 @@ function row(parameter, side) {
     h("div", { className: "track" }, parts.interval, slider, parts.baseline),
     h("div", { className: "after" }, parts.spread, parts.reset));
   return parts.element;
+}
+
+/** A typed number that no car can have: the value from before the typing comes back. */
+function refuse({ name, label, lower, upper, display_factor: factor, display_unit: unit }, text, before) {
+  set({ values: { ...get("values"), [name]: before.value } });
+  const [from, to] = [lower, upper].map((x) => units.number(x * factor));
+  notice("warning", `${label} stays ${units.number(before.value * factor)} ${unit}`,
+    `${text} ${unit} is not accepted; give ${from} to ${to} ${unit}.`);
+}
+
+/** A typed number beyond the slider is taken, since cars differ, but not without a word. */
+function tellBeyond(parameter) {
+  const { name, label, display_factor: factor, display_unit: unit } = parameter;
+  const { slider_lower: from, slider_upper: to } = parameter;
+  const value = get("values")[name];
+  if (value >= from && value <= to) return;
+  const [shown, lower, upper] = [value, from, to].map((x) => units.number(x * factor));
+  notice("warning", `${label} is now ${shown} ${unit}`,
+    `That is beyond its slider, ${lower} to ${upper} ${unit}; the arrow beside it brings the ` +
+    "baseline back.");
 }
 
 /** "Front stabilizer bar stiffness" under "Front axle" is "Bar stiffness"; the title says it all. */
@@ -178,6 +201,7 @@ function show() {
     parts.baseline.style.left = at(start);
     band(parts, estimates.get(name), factor, at, shown);
   }
+  $("#interval-legend").hidden = estimates.size === 0;
   $("#reset-all").disabled = changed === 0;
   $("#set-baseline").disabled = changed === 0;
 }

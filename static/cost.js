@@ -25,7 +25,7 @@ export function costChart(height) {
           splits: (_, _axis, low, high) => decades(low, high),
           values: decadeLabels },
       ],
-      series: [{}, { stroke: "#e69f00", width: 1.5, points: { show: true, size: 4 } }],
+      series: [{}, { stroke: AXIS.stroke, width: 1.5, points: { show: true, size: 4 } }],
     }, data, element);
     fitWidth(plot, element);
   };

@@ -44,6 +44,21 @@ export function symbol(text) {
   return h("span", { className: "symbol" }, greek, index ? h("sub", {}, index) : null);
 }
 
+const KEYED = "button, input, select, summary";
+const keyOf = (element) => element.id || element.getAttribute("aria-label") || element.textContent;
+
+/** Build a panel anew without losing the reader's place: what scrolls and what has the focus. */
+export function inPlace(panel, rebuild) {
+  const boxes = () => [panel, ...panel.querySelectorAll(".scrolls")];
+  const tops = new Map(boxes().map((box) => [box.className, box.scrollTop]));
+  const focused = panel.contains(document.activeElement) ? keyOf(document.activeElement) : null;
+  rebuild();
+  for (const box of boxes()) box.scrollTop = tops.get(box.className) ?? 0;
+  if (!focused) return;
+  const again = [...panel.querySelectorAll(KEYED)].find((element) => keyOf(element) === focused);
+  again?.focus({ preventScroll: true });
+}
+
 /** Tabs by the ARIA pattern: arrows move, one panel shows. Returns `select(id)`. */
 export function tabs(list, onSelect = () => {}) {
   const buttons = [...list.querySelectorAll('[role="tab"]')];

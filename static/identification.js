@@ -2,7 +2,7 @@
 
 import * as api from "./api.js";
 import { withValues } from "./controls.js";
-import { $, h } from "./dom.js";
+import { $, h, inPlace } from "./dom.js";
 import { notice, refused } from "./notices.js";
 import { brakingOf, rimsOf } from "./preparation.js";
 import * as result from "./result.js";
@@ -75,7 +75,8 @@ async function start() {
     braking: brakingOf(runs.map(({ id }) => id)),
     key: crypto.randomUUID?.() ?? String(Math.random()).slice(2),
   };
-  if (Object.keys(choice.bounds).length) body.bounds = choice.bounds;
+  const bounds = setup.bounds();
+  if (Object.keys(bounds).length) body.bounds = bounds;
   holdouts = Object.fromEntries(setup.runsAs("holdout").map((run) => [run.id, null]));
   try {
     job = await api.identify(body);
@@ -152,7 +153,7 @@ function show() {
   const running = busy();
   $("#identify").disabled = running;
   $("#identify").textContent = running ? "Identifying …" : "Identify";
-  panel.replaceChildren(
+  inPlace(panel, () => panel.replaceChildren(
     h("div", { className: "switch", role: "group", "aria-label": "Identification" },
       step("setup", "Set-up"), step("fit", "Fit"),
       h("span", { className: "grow" }),
@@ -161,8 +162,8 @@ function show() {
             "Cancel")
         : h("button", { type: "button", id: "start", className: "primary", on: { click: start } },
             "Identify")),
-    view === "setup" ? setup.view(show) : result.view(job, holdouts, hooks.apply),
-  );
+    view === "setup" ? setup.view() : result.view(job, holdouts, hooks.apply),
+  ));
   if (view === "fit") result.advance(job);
 }
 

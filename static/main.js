@@ -15,7 +15,7 @@ import * as controls from "./controls.js";
 import { $, debounced, tabs } from "./dom.js";
 import * as identification from "./identification.js";
 import * as measurements from "./measurements.js";
-import { banner, notice, refused } from "./notices.js";
+import { banner, listenToKeys, notice, refused } from "./notices.js";
 import * as ride from "./ride.js";
 import * as scene from "./scene.js";
 import { idle, timing, want } from "./simulation.js";
@@ -25,7 +25,9 @@ import * as units from "./units.js";
 
 const RETRY = 1500;
 const SAVE_AFTER = 400;
-const LOW_WINDOW = 850;
+/** Height in which the twelve rows of a fit are seen at once, px; the 3D view's share by default. */
+const FIT_HEIGHT = 432;
+const STAGE_SHARE = [38, 54];
 
 const sid = location.pathname.split("/")[2];
 let unsaved = false;
@@ -61,6 +63,7 @@ function build() {
   });
   timeline.build();
   timeline.listenToKeys();
+  listenToKeys();
   controls.build({ onBaseline: setBaseline });
   ride.build();
   charts.build(() => want("now", "reference"));
@@ -84,7 +87,11 @@ function follow() {
     saveSoon();
     want("now", ...(get("compare") === "7dof" ? ["reference"] : []));
   });
-  on("baseline compare", () => want("reference"));
+  on("baseline", () => want("reference"));
+  on("compare", () => {
+    set({ reference: null });
+    want("reference");
+  });
   on("liftOff traction rimsSettings braking", () => want("now", "reference"));
   on("vehicle", () => want("now", "scene", "reference"));
   on("ride road", () => {
@@ -192,7 +199,14 @@ function splitter() {
     document.documentElement.style.setProperty("--bench", `${100 - bounded}fr`);
     bar.setAttribute("aria-valuenow", Math.round(bounded));
   };
+  // Until the bar is moved, the rows of a fit go before the view in a low window.
+  const watch = new ResizeObserver(() => {
+    const share = 100 - (100 * FIT_HEIGHT) / $("main").clientHeight;
+    put(Math.min(Math.max(share, STAGE_SHARE[0]), STAGE_SHARE[1]));
+  });
+  watch.observe($("main"));
   bar.addEventListener("pointerdown", (event) => {
+    watch.disconnect();
     bar.setPointerCapture(event.pointerId);
     document.body.classList.add("dragging");
   });
@@ -206,10 +220,9 @@ function splitter() {
     const step = { ArrowUp: -4, ArrowDown: 4 }[event.key];
     if (!step) return;
     event.preventDefault();
+    watch.disconnect();
     put(Number(bar.getAttribute("aria-valuenow")) + step);
   });
-  // A low window has no room for both: the twelve rows of a fit go before the view.
-  put(window.innerHeight < LOW_WINDOW ? 42 : 54);
 }
 
 function help() {

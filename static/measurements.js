@@ -1,7 +1,7 @@
 // Measured rides: add by button or by dropping files, look at them, delete them.
 
 import * as api from "./api.js";
-import { $, breakable, h } from "./dom.js";
+import { $, breakable, h, inPlace } from "./dom.js";
 import { notice } from "./notices.js";
 import { AXIS, fitWidth } from "./plots.js";
 import { choose } from "./ride.js";
@@ -81,7 +81,7 @@ async function add(files) {
 function show() {
   const rows = get("measurements");
   if (!rows.some(({ id }) => id === selected)) selected = rows[0]?.id ?? null;
-  parts.list.replaceChildren(
+  inPlace(parts.list, () => parts.list.replaceChildren(
     h("div", { className: "row-tools" },
       h("button", { type: "button", id: "upload", on: { click: () => parts.file.click() } },
         "Add files …"),
@@ -93,7 +93,7 @@ function show() {
     ...(rows.length ? [table(rows)] : [h("p", { className: "empty" },
       "No measurement yet. Add a CSV file whose header names channels and units, such as " +
       "“time [s],chassis.z [mm],wheel.fl.z [mm]”.")]),
-  );
+  ));
   detail(rows.find(({ id }) => id === selected));
 }
 

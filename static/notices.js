@@ -4,8 +4,9 @@ import { $, h } from "./dom.js";
 import { worded } from "./wording.js";
 
 const KEPT = { info: 6000, warning: 15000 };
+const MOST = 4;
 
-/** A message in the corner; errors stay until they are dismissed. */
+/** A message over the 3D view, newest first; errors stay until they are dismissed. */
 export function notice(kind, title, text = "", action = null) {
   const box = h(
     "div",
@@ -17,15 +18,36 @@ export function notice(kind, title, text = "", action = null) {
           action.label)
       : null,
     h("button", {
-      type: "button", className: "dismiss", title: "Dismiss", "aria-label": "Dismiss",
+      type: "button", className: "dismiss", title: "Dismiss (Esc)", "aria-label": "Dismiss",
       on: { click: () => box.remove() },
     }, "×"),
   );
   const all = $("#notices");
-  all.append(box);
-  while (all.children.length > 4) all.firstChild.remove();
-  if (KEPT[kind]) setTimeout(() => box.remove(), KEPT[kind]);
+  all.prepend(box);
+  while (all.children.length > MOST) all.lastChild.remove();
+  if (KEPT[kind]) leaveAfter(box, KEPT[kind]);
   return box;
+}
+
+/** Goes by itself, but not while it is pointed at or holds the focus. */
+function leaveAfter(box, wait) {
+  let timer = 0;
+  const leave = () => { timer = setTimeout(() => box.remove(), wait); };
+  for (const event of ["pointerenter", "focusin"]) {
+    box.addEventListener(event, () => clearTimeout(timer));
+  }
+  for (const event of ["pointerleave", "focusout"]) {
+    box.addEventListener(event, () => { clearTimeout(timer); leave(); });
+  }
+  leave();
+}
+
+/** Escape takes the newest message away, unless something else is open that it closes. */
+export function listenToKeys() {
+  document.addEventListener("keydown", (event) => {
+    if (event.key !== "Escape" || event.defaultPrevented || $("dialog[open]")) return;
+    $("#notices").firstChild?.remove();
+  });
 }
 
 /** Show a refusal; a lost connection is the banner's business. */

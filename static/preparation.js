@@ -23,9 +23,9 @@ export const brakingOf = (ids) =>
   Object.fromEntries(Object.entries(get("braking")).filter(([id]) => ids.includes(id)));
 
 /** The choices that hold for every recording. */
-export function view(redraw) {
+export function view() {
   const settings = get("rimsSettings");
-  const change = (changes) => set({ rimsSettings: { ...settings, ...changes } });
+  const change = (changes) => set({ rimsSettings: { ...get("rimsSettings"), ...changes } });
   return h("details", { className: "preparation", open: opened,
     on: { toggle: (event) => { opened = event.target.open; } } },
     h("summary", {}, "How recordings drive the model"),
@@ -44,7 +44,7 @@ export function view(redraw) {
           on: { change: () => {
             const hertz = field.value === "" ? null : Number(field.value);
             if (hertz === null || hertz > 0) change({ [key]: hertz });
-            redraw();
+            else field.value = get("rimsSettings")[key] ?? "";
           } },
         });
         return h("tr", {}, h("th", { scope: "row", title: what }, name), h("td", {}, field));
@@ -61,7 +61,7 @@ function choice(label, id, options, chosen, change, title) {
 }
 
 /** When one run brakes, s: a field that is empty while aₓ tells. */
-export function brakingField(run, redraw) {
+export function brakingField(run) {
   const marked = get("braking")[run.id];
   const field = h("input", {
     type: "text", className: "braking", value: marked ? written(marked) : "",
@@ -74,7 +74,7 @@ export function brakingField(run, redraw) {
         ? "Write begin-end in seconds, such as 6.2-9.8, or none." : "");
       if (!field.reportValidity()) return;
       set({ braking: intervals ? { ...others, [run.id]: intervals } : others });
-      redraw();
+      field.value = intervals ? written(intervals) : "";
     } },
   });
   return field;

@@ -32,10 +32,11 @@ export function view(job, holdouts, apply) {
   return h("div", { className: "fit" },
     h("div", { className: "fit-main scrolls", tabIndex: 0, role: "region",
       "aria-label": "Identified parameters" },
-      h("p", { className: `outcome ${job.state}`, id: "outcome" }, outcome(job)),
+      h("p", { className: `outcome ${job.state}`, id: "outcome" }, outcome(job), " ", toWarnings(result)),
       estimates(result),
       result.warnings.length
-        ? h("ul", { className: "warnings" }, result.warnings.map((text) => h("li", {}, worded(text))))
+        ? h("ul", { className: "warnings", tabIndex: -1 },
+            result.warnings.map((text) => h("li", {}, worded(text))))
         : null),
     h("div", { className: "fit-side scrolls" },
       h("button", { type: "button", id: "apply", className: "primary wide",
@@ -66,6 +67,18 @@ function outcome(job) {
   return `${result.outcome} ${units.number(result.seconds, 2)} s, ${result.simulations} simulations.`;
 }
 
+/** In a low window the warnings lie below the table; this leads there. */
+function toWarnings({ warnings }) {
+  if (!warnings.length) return "";
+  return h("button", {
+    type: "button", className: "link to-warnings",
+    on: { click: () => {
+      $("#identification .warnings").scrollIntoView({ block: "nearest" });
+      $("#identification .warnings").focus({ preventScroll: true });
+    } },
+  }, `${warnings.length} warning${warnings.length > 1 ? "s" : ""} below`);
+}
+
 /** Only numbers and the curve move while the fit runs. */
 export function advance(job) {
   if (!job || !cost) return;
@@ -85,28 +98,36 @@ export function advance(job) {
 }
 
 function estimates(result) {
+  const columns = [["Parameter"], ["Value"], ["Unit", "unit"], ["95 % interval"], ["Start", "long"],
+    ["Searched between", "bounds"], ["Determined"]];
   return h("table", { className: "estimates" },
-    h("thead", {}, h("tr", {},
-      ["Parameter", "Value", "Unit", "95 % interval", "Start", "Determined"].map((text) =>
-        h("th", { scope: "col", className: text === "Start" ? "long" : "" }, text)))),
-    h("tbody", {}, result.parameters.map((estimate) => {
-      const row = units.parameter(estimate.name);
-      const factor = row.display_factor;
-      const interval = estimate.confidence_interval;
-      return h("tr", {},
-        h("th", { scope: "row", title: row.label }, symbol(row.symbol), " ",
-          h("span", { className: "soft long" }, row.label)),
-        h("td", { className: "strong" }, units.number(estimate.value * factor)),
-        h("td", { className: "unit" }, row.display_unit),
-        h("td", { className: "span", title: `Searched from ${units.number(estimate.lower * factor)} ` +
-            `to ${units.number(estimate.upper * factor)} ${row.display_unit}` }, isBounded(interval)
-          ? `${units.number(interval[0] * factor, 3)} … ${units.number(interval[1] * factor, 3)}`
-          : "unbounded"),
-        h("td", { className: "soft long" }, units.number(estimate.start * factor)),
-        h("td", {}, h("span", {
-          className: `determined ${estimate.determined}`, title: DETERMINED[estimate.determined],
-        }, WELL[estimate.determined])));
-    })));
+    h("thead", {}, h("tr", {}, columns.map(([text, className = ""]) =>
+      h("th", { scope: "col", className }, text)))),
+    h("tbody", {}, result.parameters.map(estimateRow)));
+}
+
+function estimateRow(estimate) {
+  const row = units.parameter(estimate.name);
+  const shown = (value, digits) => units.number(value * row.display_factor, digits);
+  const interval = estimate.confidence_interval;
+  const bounds = `${shown(estimate.lower, 3)} … ${shown(estimate.upper, 3)}`;
+  const upper = estimate.upper - estimate.value < estimate.value - estimate.lower;
+  const searched = `Searched between ${bounds} ${row.display_unit}, from ${shown(estimate.start)}`;
+  return h("tr", { title: searched },
+    h("th", { scope: "row", title: `${row.label}. ${searched}` }, symbol(row.symbol), " ",
+      h("span", { className: "soft long" }, row.label)),
+    h("td", { className: "strong" }, shown(estimate.value)),
+    h("td", { className: "unit" }, row.display_unit),
+    h("td", { className: "span" }, isBounded(interval)
+      ? `${shown(interval[0], 3)} … ${shown(interval[1], 3)}` : "unbounded"),
+    h("td", { className: "soft long" }, shown(estimate.start)),
+    h("td", { className: "soft span bounds" }, bounds),
+    h("td", {}, h("span", {
+      className: `determined ${estimate.determined}`,
+      title: estimate.at_bound
+        ? `At its ${upper ? "upper" : "lower"} bound, so ${DETERMINED[estimate.determined]}. ${searched}`
+        : DETERMINED[estimate.determined],
+    }, estimate.at_bound ? `at ${upper ? "upper" : "lower"}` : WELL[estimate.determined])));
 }
 
 /** Fit percent of every run, fitted or held out. */
@@ -127,7 +148,7 @@ function scores(job, holdouts) {
         h("th", { scope: "row", title: name }, h("span", { className: "run-name" }, breakable(name.replace(/\.\w+$/, ""))),
           h("span", { className: "soft" }, ` ${role}`)),
         typeof score === "string"
-          ? h("td", { colSpan: channels.length || 1 }, score)
+          ? h("td", { colSpan: channels.length || 1 }, worded(score))
           : channels.map((channel) => h("td", {},
             score ? percent(score[channel]).replace(" %", "") : "…"))))));
 }

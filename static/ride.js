@@ -20,7 +20,7 @@ export function build() {
       h("option", { value: JSON.stringify(road) }, text)),
   );
   on("measurements manoeuvres", list);
-  on("ride", show);
+  on("ride road compare", show);
   list();
   show();
 }
@@ -79,5 +79,8 @@ function show() {
   const onRoad = ride.kind === "manoeuvre" && manoeuvre?.kind !== "posts";
   $("#road-field").hidden = !onRoad;
   $("#road").value = get("road") ? JSON.stringify(get("road")) : "";
-  $("#ride").title = manoeuvre?.description ?? "";
+  for (const id of ["#ride", "#road", "#compare"]) {
+    const chosen = $(id).selectedOptions[0];
+    $(id).title = [chosen?.text, chosen?.title].filter(Boolean).join(": ");
+  }
 }

@@ -6,7 +6,7 @@ import { get } from "./store.js";
 import * as units from "./units.js";
 
 const ROLES = { fit: "fit", holdout: "hold out", no: "leave out" };
-/** What is chosen: the role of each run, free parameters, bounds that differ from the default. */
+/** What is chosen: the role of each run, fixed parameters, typed bounds as {name: [SI or null]}. */
 export const choice = { roles: {}, fixed: new Set(), bounds: {} };
 
 /** How a run is used: unless chosen, the ride on show (or the first) is fitted, others held out. */
@@ -21,31 +21,34 @@ function roleOf(run) {
 
 export const runsAs = (role) => get("measurements").filter((run) => roleOf(run) === role);
 
-/** The set-up view; `redraw` shows it again after a choice that changes it. */
-export function view(redraw) {
+/** {name: [lower, upper]} of the parameters of which a bound is typed. */
+export const bounds = () => Object.fromEntries(get("parameters")
+  .filter(({ name }) => choice.bounds[name]?.some((typed) => typed !== null))
+  .map((parameter) => [parameter.name, boundsOf(parameter)]));
+
+export function view() {
   const runs = get("measurements");
   return h("div", { className: "setup scrolls" },
     h("section", {},
       h("h3", {}, "Runs"),
       runs.length
-        ? h("ul", { className: "runs" }, runs.map((run) => runRow(run, redraw)))
+        ? h("ul", { className: "runs" }, runs.map(runRow))
         : h("p", { className: "empty" }, "No measurement yet; add one under Measurements."),
       h("p", { className: "hint" },
         "Unless you choose, the ride on show is fitted. A run held out is not: it shows how well " +
         "the car predicts what it has not seen."),
-      preparation.view(redraw)),
+      preparation.view()),
     h("section", {},
       h("h3", {}, "Free parameters"),
+      h("p", { className: "hint" },
+        "The fit starts from the sliders. Bounds that are not typed follow the start."),
       h("table", { className: "free" },
         h("thead", {}, h("tr", {}, ["Free", "Parameter", "Start", "Lower", "Upper", "Unit"].map((text) =>
           h("th", { scope: "col" }, text)))),
-        h("tbody", {}, get("parameters").map((parameter) => freeRow(parameter, redraw)))),
-      h("p", { className: "hint" },
-        "The fit starts from the sliders and searches between the bounds. Bounds you do not type " +
-        "follow the start: 0.05 to 8 times a stiffness or damping.")));
+        h("tbody", {}, get("parameters").map(freeRow)))));
 }
 
-function runRow(run, redraw) {
+function runRow(run) {
   const role = roleOf(run);
   return h("li", {},
     h("span", { className: "run-name", title: run.name }, breakable(run.name)),
@@ -53,7 +56,7 @@ function runRow(run, redraw) {
       ? h("span", { className: "run-use" },
           select(ROLES, role, (value) => { choice.roles[run.id] = value; },
             { "aria-label": `Use of ${run.name}` }),
-          h("label", {}, "brakes", preparation.brakingField(run, redraw)))
+          h("label", {}, "brakes", preparation.brakingField(run)))
       : h("span", { className: "badge", title: `It lacks ${run.missing.join(", ")}.` },
         "not for fitting"));
 }
@@ -65,42 +68,65 @@ function select(options, value, change, properties) {
   return element;
 }
 
-function freeRow(parameter, redraw) {
+function freeRow(parameter) {
   const { name, display_factor: factor, display_unit: unit } = parameter;
   const start = get("values")[name];
-  const free = !choice.fixed.has(name);
-  const bounds = choice.bounds[name] ?? defaultBounds(parameter, start);
-  const bound = (index, word) => {
+  const free = h("input", {
+    type: "checkbox", checked: !choice.fixed.has(name), "aria-label": `${parameter.label} is free`,
+    on: { change: () => {
+      if (free.checked) choice.fixed.delete(name);
+      else choice.fixed.add(name);
+      show();
+    } },
+  });
+  const fields = ["Lower", "Upper"].map((word, side) => {
     const field = h("input", {
-      type: "number", step: "any", disabled: !free, value: units.plain(bounds[index] * factor, 4),
-      "aria-label": `${word} bound of ${parameter.label}, ${unit}`,
-      on: {
-        change: () => {
-          const both = [...(choice.bounds[name] ?? bounds)];
-          both[index] = Number(field.value) / factor;
-          if (field.value === "") delete choice.bounds[name];
-          else choice.bounds[name] = both;
-          redraw();
-        },
-      },
+      type: "number", step: "any", "aria-label": `${word} bound of ${parameter.label}, ${unit}`,
+      on: { change: () => {
+        const typed = [...(choice.bounds[name] ?? [null, null])];
+        typed[side] = field.value === "" ? null : Number(field.value) / factor;
+        choice.bounds[name] = typed;
+        show();
+      } },
     });
     return field;
-  };
-  return h("tr", { className: free ? "" : "off" },
-    h("td", {}, h("input", {
-      type: "checkbox", checked: free, "aria-label": `${parameter.label} is free`,
-      on: { change: (event) => {
-        if (event.target.checked) choice.fixed.delete(name);
-        else choice.fixed.add(name);
-        redraw();
-      } },
-    })),
+  });
+  const begins = h("td", {}, units.number(start * factor));
+  const row = h("tr", {},
+    h("td", {}, free),
     h("th", { scope: "row", title: parameter.label }, symbol(parameter.symbol), " ",
       h("span", { className: "soft long" }, parameter.label)),
-    h("td", {}, units.number(start * factor)),
-    h("td", {}, bound(0, "Lower")), h("td", {}, bound(1, "Upper")),
+    begins, fields.map((field) => h("td", {}, field)),
     h("td", { className: "unit" }, unit));
+  const show = () => {
+    const both = boundsOf(parameter);
+    const usual = defaultBounds(parameter, start);
+    fields.forEach((field, side) => {
+      const own = (choice.bounds[name]?.[side] ?? null) !== null;
+      field.value = units.short(both[side] * factor);
+      field.disabled = !free.checked;
+      field.classList.toggle("own", own);
+      field.title = own
+        ? `Typed; empty the field for the default, ${units.number(usual[side] * factor)} ${unit}`
+        : `${defaultRule(parameter)}; type a bound to hold it`;
+    });
+    const within = start >= both[0] && start <= both[1];
+    begins.className = within || !free.checked ? "" : "more";
+    begins.title = within ? "" : "The start lies outside its bounds: move the slider or a bound";
+    row.className = free.checked ? "" : "off";
+  };
+  show();
+  return row;
 }
+
+/** Between which values a parameter is searched, SI: as typed, else by default. */
+function boundsOf(parameter) {
+  const usual = defaultBounds(parameter, get("values")[parameter.name]);
+  return usual.map((value, side) => choice.bounds[parameter.name]?.[side] ?? value);
+}
+
+const defaultRule = ({ name }) =>
+  name.includes(".pivot.") ? "The same for every car" : "0.05 to 8 times the start";
 
 /** The service's default bounds, shown before the fit; it applies its own when none is changed. */
 function defaultBounds(parameter, start) {

@@ -91,12 +91,13 @@ async function measured() {
 }
 
 async function now() {
-  const [vehicle, values, ride] = [get("vehicle"), get("values"), get("ride")];
+  const [vehicle, values] = [get("vehicle"), get("values")];
+  const isStill = sameRide();
   const scene = wanted.scene;
   const asked = timing.asked;
   wanted.now = wanted.scene = false;
   const run = await retried(scene ? "scene" : "now", () => api.simulate(request({ vehicle, values, scene })));
-  if (ride !== get("ride")) return;
+  if (!isStill()) return;
   failed(null);
   set({ now: run, vehicleNow: withValues(vehicle, values) });
   timing.shown.push(performance.now() - asked);
@@ -110,13 +111,19 @@ async function reference() {
     set({ reference: null });
     return;
   }
-  const ride = get("ride");
+  const isStill = sameRide();
   const car =
     compare === "7dof"
       ? { vehicle: get("vehicle"), values: get("values"), model: "7dof" }
       : { vehicle: get("baseline") };
   const run = await retried("reference", () => api.simulate(request(car)));
-  if (ride === get("ride") && compare === get("compare")) set({ reference: run });
+  if (isStill() && compare === get("compare")) set({ reference: run });
+}
+
+/** Tells later whether the ride and its road are still the ones of now. */
+function sameRide() {
+  const [ride, road] = [get("ride"), get("road")];
+  return () => ride === get("ride") && road === get("road");
 }
 
 /** A wish that the service could not hear is kept for when it answers again. */
@@ -132,6 +139,7 @@ async function retried(name, work) {
 function failed(error) {
   const box = $("#chart-note");
   box.hidden = !error;
-  box.replaceChildren(...(error ? worded(error.message) : []));
+  const kept = get("now") ? [" The lines are those of the last car that could be simulated."] : [];
+  box.replaceChildren(...(error ? [...worded(error.message), ...kept] : []));
   set({ trouble: error });
 }

@@ -12,8 +12,9 @@ export function learn(channelRows, parameterRows) {
   }
 }
 
-/** `m/s^2` as it is written by hand. */
-export const pretty = (unit) => unit.replace("^2", "²").replace("^1.75", "¹·⁷⁵");
+/** `m/s^2` as it is written by hand; angles are in deg everywhere, as in a file's header. */
+export const pretty = (unit) =>
+  unit.replace("^2", "²").replace("^1.75", "¹·⁷⁵").replace("°", "deg");
 
 /** A channel's row, or a plain one for a name the table does not have. */
 export function channel(name, unit = "") {
@@ -72,13 +73,19 @@ const KNOWN = {
   radius: ["m", "radius, loaded"],
   mount_height: ["m", "mount height"],
   rolling_resistance: ["", "rolling resistance"],
-  front_share: ["", "front share of braking"],
+  front_share: ["", "front share"],
   stiffness: ["N/m", "stiffness"],
   damping: ["N s/m", "damping"],
 };
 
+const PARTS = { wheel: "wheel ", tyre: "tyre " };
+
 /** {unit, label} of a number of the vehicle's JSON that is no slider. */
 export function known(path) {
   const [unit, label] = KNOWN[path.split(".").at(-1)] ?? ["", path];
-  return { unit, label };
+  return { unit, label: (PARTS[path.split(".")[1]] ?? "") + label };
 }
+
+/** `front.tyre.stiffness` as a person says it, or null for what is no number of a car. */
+export const knownName = (path) =>
+  path.split(".").at(-1) in KNOWN ? `${path.split(".")[0]} ${known(path).label}` : null;

@@ -1,25 +1,34 @@
-// Sentences of the service, in the page's words: symbols for parameters' paths, display units.
+// Sentences of the service, in the page's words: names for paths, numbers in display units.
 
 import { h, symbol } from "./dom.js";
-import { get } from "./store.js";
 import * as units from "./units.js";
 
-const NUMBER = "(-?[\\d.]+(?:e[+-]?\\d+)?)";
+const PATH = /((?:chassis|front|rear|brakes)(?:\.\w+)+)/;
+const NUMBER = "-?\\d[\\d.]*(?:e[+-]?\\d+)?";
 const escaped = (text) => text.replace(/[.*+?^${}()|[\]\\/]/g, "\\$&");
 
-/** A sentence as nodes: paths become symbols, and bounds what the sliders show. */
+/** A sentence as nodes: parameters by symbol and label, their numbers as the sliders show them. */
 export function worded(text) {
-  const rows = get("parameters") ?? [];
-  let shown = text;
-  for (const { name, unit, display_factor: factor, display_unit: display } of rows) {
-    const bound = new RegExp(`(${escaped(name)} is at its \\w+ bound, )${NUMBER} ${escaped(unit)}(?=[;,. ])`, "g");
-    shown = shown.replace(bound, (_, before, value) =>
-      `${before}${units.number(Number(value) * factor)} ${units.pretty(display)}`);
-  }
-  const known = new Map(rows.map((row) => [row.name, row]));
-  const paths = new RegExp(`(${rows.map(({ name }) => escaped(name)).join("|")})(?![\\w.]*\\w)`);
-  return shown.split(rows.length ? paths : /$^/).filter(Boolean).map((part) => {
-    const row = known.get(part);
-    return row ? h("span", { title: row.label }, symbol(row.symbol)) : part;
+  return inDisplayUnits(text).split(PATH).filter(Boolean).map((part) => {
+    const row = units.parameter(part);
+    if (row) {
+      return h("span", { title: part }, symbol(row.symbol), ` ${row.label.toLowerCase()}`);
+    }
+    const name = units.knownName(part);
+    return name ? h("span", { title: part }, name) : part;
   });
+}
+
+/** One number, or two joined by "to" or "and", before the SI unit of a parameter that is named. */
+function inDisplayUnits(text) {
+  const named = text.split(PATH).map(units.parameter).filter(Boolean);
+  let shown = text;
+  for (const { unit, display_factor: factor, display_unit: display } of named) {
+    if (factor === 1) continue;
+    const said = new RegExp(`(${NUMBER})(?:( to | and )(${NUMBER}))? ${escaped(unit)}(?![\\w/^])`, "g");
+    const number = (digits) => units.number(Number(digits) * factor);
+    shown = shown.replace(said, (_, one, joined, other) =>
+      `${number(one)}${joined ? joined + number(other) : ""} ${display}`);
+  }
+  return shown;
 }

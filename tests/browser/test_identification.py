@@ -37,8 +37,15 @@ def test_a_newcomer_identifies_the_sample_car_and_applies_it(visitor):
     assert max(bottoms) <= 768, "all twelve rows are in sight"
     # Warnings speak of symbols and of the sliders' units.
     warnings = visitor.element(".warnings").inner_text()
-    assert "is at its upper bound, 2094 N m/deg" in warnings
+    assert "front stabilizer bar stiffness is at its upper bound, 2094 N m/deg" in warnings
     assert "stabilizer_bar" not in warnings
+    # A value at a bound says so, and every row between which values it was searched.
+    bar = visitor.page.locator(".estimates tr", has_text="KtorF")
+    assert "at upper" in bar.inner_text()
+    assert "Searched between 13.1 … 2094 N m/deg" in bar.get_attribute("title")
+    visitor.click(".to-warnings")
+    last = visitor.element("#identification .warnings li").last.bounding_box()
+    assert last["y"] + last["height"] <= 768
 
     visitor.click("#apply")
     visitor.settled()
@@ -141,3 +148,59 @@ def test_without_a_measurement_the_page_says_what_to_do(visitor):
     visitor.until("ridetune.state('ride').kind === 'manoeuvre' && ridetune.state('now') !== null")
     visitor.click("#identify")
     assert "at least one measured run" in visitor.element("#notices").inner_text()
+
+
+def test_typed_bounds_hold_and_the_others_follow_the_slider(visitor):
+    """Oracle: 0.05 to 8 times the start, as docs/identification.md says of the defaults."""
+    visitor.click("#tab-identification")
+    lower, upper = (
+        visitor.page.get_by_label(f"{word} bound of Front spring stiffness")
+        for word in ("Lower", "Upper")
+    )
+    assert (float(lower.input_value()), float(upper.input_value())) == (22 * 0.05, 22 * 8)
+    lower.fill("12")
+    lower.press("Tab")
+    assert upper.evaluate("(field) => field === document.activeElement")
+    visitor.element("#value-front-suspension-stiffness").fill("30")
+    visitor.element("#value-front-suspension-stiffness").press("Enter")
+    visitor.settled()
+    assert (float(lower.input_value()), float(upper.input_value())) == (12, 30 * 8)
+    free_only(visitor, "KF")
+    visitor.click("#start")
+    visitor.until("ridetune.state('fit') !== null", 120)
+    [found] = visitor.look("ridetune.job().result.parameters")
+    assert (found["lower"], found["upper"]) == (12e3, 240e3)
+
+    visitor.click("#identification >> text=Set-up")
+    lower.fill("")
+    lower.press("Tab")
+    assert float(lower.input_value()) == 30 * 0.05
+
+
+def test_a_choice_keeps_focus_and_place(visitor):
+    """By keyboard alone one fixes the last parameters of the list and looks at the fit."""
+    visitor.click("#tab-identification")
+    last = visitor.page.get_by_label("Rear pivot angle is free")
+    last.focus()
+    top = visitor.element(".setup").evaluate("(box) => box.scrollTop")
+    assert top > 0
+    visitor.page.keyboard.press("Space")
+    assert not last.is_checked()
+    assert last.evaluate("(box) => box === document.activeElement")
+    assert visitor.element(".setup").evaluate("(box) => box.scrollTop") == top
+    visitor.page.get_by_role("button", name="Fit", exact=True).press("Enter")
+    assert visitor.page.evaluate("document.activeElement.textContent") == "Fit"
+
+
+def test_a_known_number_keeps_the_hand_in_its_field(visitor):
+    visitor.click("#tab-car")
+    mass, next_one = visitor.element("[title='chassis.mass'] input"), ".known input >> nth=1"
+    mass.fill("1100")
+    mass.press("Tab")
+    visitor.until("ridetune.state('vehicle').chassis.mass === 1100")
+    visitor.settled()
+    assert visitor.element(next_one).evaluate("(field) => field === document.activeElement")
+    # An empty field is no zero.
+    mass.fill("")
+    mass.press("Tab")
+    assert mass.input_value() == "1100"

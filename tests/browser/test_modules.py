@@ -123,3 +123,40 @@ def test_the_spectrum_holds_the_power_of_the_signal(visitor):
     assert area == pytest.approx(4.5, rel=0.02)
     assert peak == pytest.approx(4.0, abs=0.11)
     assert noise == pytest.approx(variance, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("said", "shown"),
+    [
+        (
+            "front.suspension.stiffness is at its upper bound, 1.76e+05 N/m; widen the bound.",
+            "KF front spring stiffness is at its upper bound, 176.0 N/mm; widen the bound.",
+        ),
+        (
+            "The bounds of rear.pivot.angle, 1.3 to -0.3 rad, are crossed.",
+            "The bounds of φR rear pivot angle, 74.48 to −17.19 deg, are crossed.",
+        ),
+        (
+            "front.suspension.stiffness is 1e+08 N/m, but must lie between 100 and 1e+07 N/m.",
+            "KF front spring stiffness is 100000 N/mm, but must lie between 0.1000 and 10000 N/mm.",
+        ),
+        (
+            "rear.stabilizer_bar.damping starts at 1800 N m s/rad, rear.stabilizer_bar.stiffness "
+            "at 18000 N m/rad.",
+            "CtorR rear stabilizer bar damping starts at 31.42 N m s/deg, KtorR rear stabilizer "
+            "bar stiffness at 314.2 N m/deg.",
+        ),
+        # What is no slider is shown in SI on the page, too; channels keep their column's name.
+        ("front.tyre.stiffness is 5 N/m.", "front tyre stiffness is 5 N/m."),
+        ("chassis.z of run a.csv moves 3 times as much.",) * 2,
+    ],
+)
+def test_sentences_of_the_service_are_said_in_the_pages_words(visitor, said, shown):
+    """Oracle: unit conversion by hand; 1 rad is 57.296 deg."""
+    text = in_module(
+        visitor,
+        "wording",
+        """return m.worded(a[0]).map((part) => part.textContent ?? part).join("");""",
+        said,
+    )
+    assert text == shown

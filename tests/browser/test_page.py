@@ -1,5 +1,6 @@
 """Tuning on the page: sliders, charts, 3D, keys, and what happens when things go away."""
 
+import re
 import signal
 
 import numpy as np
@@ -38,6 +39,13 @@ def seek(visitor, time):
         """(time) => { const slider = document.querySelector("#time"); slider.value = time;
             slider.dispatchEvent(new Event("input")); }""",
         time,
+    )
+
+
+def add_message(visitor, title):
+    visitor.page.evaluate(
+        "async (t) => (await import('/static/notices.js')).notice('info', t, 'More. '.repeat(12))",
+        title,
     )
 
 
@@ -180,7 +188,7 @@ def test_keys_play_scrub_and_leave_fields_alone(spectator):
     press(spectator, "#value-front-suspension-stiffness", "ArrowLeft", "Home")
     assert spectator.look("ridetune.clock.time") == time
     # The 3D view hands the keys on.
-    spectator.element("#view iframe").click(position={"x": 200, "y": 200})
+    spectator.element("#view iframe").click(position={"x": 200, "y": 100})
     keyboard.press("Space")
     spectator.until("ridetune.clock.playing")
     spectator.settled()
@@ -248,7 +256,7 @@ def test_an_impossible_car_is_refused_in_words(visitor):
     field.fill("-3")
     field.press("Enter")
     visitor.wait(lambda: visitor.element(".notice.error").is_visible(), "the refusal is shown")
-    assert "chassis.mass" in visitor.element(".notice.error").inner_text()
+    assert "chassis mass is -3, but must lie" in visitor.element(".notice.error").inner_text()
     assert field.input_value() == "1048.5"
 
 
@@ -304,14 +312,107 @@ def test_the_page_goes_on_when_the_service_has_been_away(visit, tmp_path):
 
 
 def test_a_number_no_car_can_have_is_refused_in_place(visitor):
-    """The old value stays; the message covers no slider."""
-    before = visitor.value("front.suspension.stiffness")
+    """The value from before the typing stays, whatever the first digits would have been."""
+    before = visitor.value(STIFFNESS)
     field = visitor.element("#value-front-suspension-stiffness")
-    field.fill("50000000")
-    field.blur()
+    field.click()
+    visitor.page.keyboard.press("Control+A")
+    visitor.page.keyboard.type("50000000")
+    visitor.page.keyboard.press("Tab")
     notice = visitor.element(".notice.warning")
     assert "50000000 N/mm is not accepted; give 0.1000 to 10000 N/mm" in notice.inner_text()
-    assert visitor.value("front.suspension.stiffness") == before
+    assert visitor.value(STIFFNESS) == before
     assert float(field.input_value()) == before / 1000
-    parameters = visitor.element("#parameters").bounding_box()
-    assert notice.bounding_box()["x"] >= parameters["x"] + parameters["width"]
+    visitor.page.keyboard.press("Escape")
+    assert not notice.is_visible()
+
+
+def test_a_number_beyond_the_slider_is_taken_with_a_word(visitor):
+    field = visitor.element("#value-front-suspension-stiffness")
+    field.fill("5000")
+    field.press("Enter")
+    said = visitor.element(".notice.warning").inner_text()
+    assert "Front spring stiffness is now 5000 N/mm" in said
+    assert "beyond its slider, 5.000 to 100.0 N/mm" in said
+    assert visitor.value(STIFFNESS) == 5e6
+    visitor.settled()
+
+
+@pytest.mark.parametrize(("width", "height"), [(1366, 768), (1440, 900), (1920, 1080)])
+def test_messages_hide_no_control(visitor, width, height):
+    """Oracle: the browser's own answer to what lies under the middle of each control."""
+    visitor.page.set_viewport_size({"width": width, "height": height})
+    for k in range(4):
+        add_message(visitor, f"Message {k}")
+    hidden = visitor.page.evaluate(
+        """() => [...document.querySelectorAll("button, select, input, [role=separator]")]
+            .filter((e) => e.checkVisibility({ visibilityProperty: true, opacityProperty: true }))
+            .filter((e) => !e.closest("#notices, #parameters, .scrolls, [role=tabpanel]"))
+            .filter((e) => {
+                const box = e.getBoundingClientRect();
+                const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+                const top = document.elementFromPoint(x, y);
+                return top?.closest("#notices");
+            }).map((e) => e.outerHTML)"""
+    )
+    assert hidden == []
+    messages = visitor.element("#notices").bounding_box()
+    view = visitor.element("#view").bounding_box()
+    assert messages["x"] >= view["x"]
+    assert messages["y"] >= view["y"]
+    assert messages["x"] + messages["width"] <= view["x"] + view["width"]
+    assert messages["y"] + messages["height"] <= view["y"] + view["height"]
+
+
+def test_messages_leave_by_themselves_unless_they_are_being_read(visitor):
+    visitor.page.clock.install()
+    add_message(visitor, "Read me")
+    message = visitor.element(".notice")
+    message.locator(".dismiss").focus()
+    visitor.page.clock.run_for(60_000)
+    assert message.is_visible()
+    message.locator(".dismiss").blur()
+    visitor.page.clock.run_for(60_000)
+    assert not message.is_visible()
+
+
+def test_what_a_select_shows_is_not_cut_off(visitor):
+    """Oracle: the text's own width in the select's font; 20 px hold the arrow."""
+    visitor.page.select_option("#ride", "manoeuvre 1")
+    visitor.page.select_option("#compare", "7dof")
+    visitor.settled()
+    cut = visitor.page.evaluate(
+        """() => ["#ride", "#road", "#compare"].filter((selector) => {
+            const select = document.querySelector(selector);
+            const pen = document.createElement("canvas").getContext("2d");
+            const style = getComputedStyle(select);
+            pen.font = style.font;
+            const { text } = select.selectedOptions[0];
+            const room = select.clientWidth - 2 * parseFloat(style.paddingLeft) - 20;
+            return pen.measureText(text).width > room || !select.title.startsWith(text);
+        })"""
+    )
+    assert cut == []
+
+
+def test_angles_have_one_unit(visitor):
+    visitor.settled()
+    text = visitor.element("body").inner_text()
+    assert "Pitch, rms" in text
+    assert "°" not in text
+
+
+def test_the_car_compared_with_is_never_another_than_the_legend_says(visitor):
+    """On this road the 8-DOF car fails and the 7-DOF car does not."""
+    visitor.expect("status of 422")
+    visitor.page.select_option("#ride", "manoeuvre 2")
+    visitor.page.select_option("#compare", "7dof")
+    visitor.page.select_option("#road", label="ISO 8608 class H")
+    visitor.settled()
+    assert visitor.look("ridetune.state('reference')") is not None
+    visitor.page.select_option("#compare", "baseline")
+    visitor.settled()
+    assert visitor.look("ridetune.state('reference')") is None
+    charts = visitor.element("#chart-area").inner_text()
+    assert "Not simulated." in charts
+    assert not re.search(r"\d", charts)
