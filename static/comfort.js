@@ -2,6 +2,7 @@
 
 import * as api from "./api.js";
 import { $, fileName, h, saveFile } from "./dom.js";
+import { nameOf } from "./names.js";
 import { refused } from "./notices.js";
 import { ofRide } from "./simulation.js";
 import { get, on, set } from "./store.js";
@@ -43,7 +44,7 @@ function show() {
   const figures = h("table", { className: "metrics" },
     h("thead", {}, h("tr", {},
       h("th", { scope: "col" }, "Metric of the ride"), h("th", { scope: "col" }, name),
-      h("th", { scope: "col" }, "Now"), h("th", { scope: "col" }, "Unit"),
+      h("th", { scope: "col" }, "Now"), h("th", { scope: "col", className: "unit" }, "Unit"),
       h("th", { scope: "col" }, "Change"))),
     h("tbody", {}, rows));
   table.replaceChildren(...[fits(now, other, name), warnings(now), figures].filter(Boolean));
@@ -52,7 +53,7 @@ function show() {
 async function save() {
   const ride = get("ride");
   const name = ride.key ? `manoeuvre-${ride.key}`
-    : get("measurements").find(({ id }) => id === ride.id).name;
+    : nameOf(ride.id);
   try {
     const file = await api.simulateFile(ofRide({ vehicle: get("vehicle"), values: get("values") }));
     saveFile(file, `${fileName(name)}-simulated.csv`);

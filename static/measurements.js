@@ -2,15 +2,15 @@
 
 import * as api from "./api.js";
 import { $, breakable, h, inPlace } from "./dom.js";
+import { nameOf } from "./names.js";
 import { notice } from "./notices.js";
-import { AXIS, fitWidth } from "./plots.js";
+import { AXIS, COLOURS, fitWidth } from "./plots.js";
 import { choose } from "./ride.js";
 import { settled } from "./simulation.js";
 import { get, on, set } from "./store.js";
 import * as units from "./units.js";
 
 const PREVIEW_SAMPLES = 1500;
-const MEASURED = "#c9ced6";
 
 let selected = null;
 let failures = [];
@@ -66,7 +66,7 @@ async function add(files) {
       const row = await api.upload(file);
       set({ measurements: [...get("measurements"), row] });
       selected = row.id;
-      notice("info", `${row.name} is in`, row.usable_for_identification
+      notice("info", `${nameOf(row.id)} is in`, row.usable_for_identification
         ? `${units.number(row.duration, 3)} s, ready for identification.`
         : `It lacks ${row.missing.join(", ")} for identification.`);
     } catch (error) {
@@ -104,7 +104,7 @@ function table(rows) {
       type: "button", "aria-pressed": row.id === selected,
       on: { click: () => { selected = row.id; show(); } },
     },
-    h("span", { className: "name" }, breakable(row.name)),
+    h("span", { className: "name" }, breakable(nameOf(row.id))),
     h("span", { className: "soft" }, `${units.number(row.duration, 3)} s, every ` +
       `${units.number(1000 * row.sample_step, 3)} ms, ${channels} channels `, badges(row))));
   }));
@@ -138,7 +138,7 @@ function detail(row) {
   choice.addEventListener("change", () => look(row, choice.value, drawing, facts));
   parts.detail.replaceChildren(
     h("div", { className: "row-tools" },
-      h("strong", { className: "name" }, breakable(row.name)),
+      h("strong", { className: "name" }, breakable(nameOf(row.id))),
       row.usable_for_identification
         ? h("button", { type: "button", on: { click: () => choose(`measurement ${row.id}`) } },
             "Use as ride")
@@ -180,7 +180,7 @@ async function preview(row, name, drawing, facts) {
     width: Math.max(drawing.clientWidth, 200), height: 132, legend: { show: false },
     scales: { x: { time: false } }, cursor: { show: false }, padding: [6, 10, 0, 0],
     axes: [{ ...AXIS, size: 26, gap: 3 }, { ...AXIS, size: 46, gap: 4 }],
-    series: [{}, { stroke: MEASURED, width: 1.2, points: { show: false } }],
+    series: [{}, { stroke: COLOURS.measured, width: 1.2, points: { show: false } }],
   }, [Array.from(run.time), Array.from(run.values[name], (v) =>
     (Number.isFinite(v) ? v * factor : null))], drawing);
   fitWidth(plot, drawing);

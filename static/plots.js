@@ -1,4 +1,10 @@
-// What all plots share: their axes' look, powers of ten, and a size that follows their box.
+// What all plots share: the runs' colours, their axes' look, powers of ten, and a size that follows their box.
+
+const style = getComputedStyle(document.documentElement);
+
+/** Colours of the runs, as style.css has them for legends and numbers. */
+export const COLOURS = Object.fromEntries(["measured", "reference", "now"].map((run) =>
+  [run, style.getPropertyValue(`--${run}`).trim()]));
 
 export const AXIS = {
   stroke: "#93a0ae",

@@ -1,6 +1,7 @@
 // How recordings drive the model: traction, initial state, filters, and when each run brakes.
 
 import { h } from "./dom.js";
+import { nameOf } from "./names.js";
 import { get, set } from "./store.js";
 
 const FILTERS = [
@@ -65,7 +66,7 @@ export function brakingField(run) {
   const marked = get("braking")[run.id];
   const field = h("input", {
     type: "text", className: "braking", value: marked ? written(marked) : "",
-    placeholder: "as aₓ shows", "aria-label": `When ${run.name} brakes`,
+    placeholder: "as aₓ shows", "aria-label": `When ${nameOf(run.id)} brakes`,
     title: "When the car brakes, s, e.g. 6.2-9.8 or 3-4, 12-15; none for never; empty: found in aₓ",
     on: { change: () => {
       const { [run.id]: _, ...others } = get("braking");

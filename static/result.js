@@ -4,7 +4,7 @@ import { percent, short } from "./comfort.js";
 import { DETERMINED, isBounded } from "./controls.js";
 import { costChart } from "./cost.js";
 import { $, breakable, fileName, h, saveFile, symbol } from "./dom.js";
-import { get } from "./store.js";
+import { distinct, nameOf } from "./names.js";
 import * as units from "./units.js";
 import { worded } from "./wording.js";
 
@@ -61,7 +61,7 @@ function running(job) {
 }
 
 function outcome(job) {
-  if (job.state === "running") return `Fitting ${job.runs.map(({ name }) => name).join(", ")} …`;
+  if (job.state === "running") return `Fitting ${job.runs.map(({ id, name }) => nameOf(id) ?? name).join(", ")} …`;
   if (!job.result) return STATES[job.state];
   const { result } = job;
   return `${result.outcome} ${units.number(result.seconds, 2)} s, ${result.simulations} simulations.`;
@@ -93,7 +93,8 @@ export function advance(job) {
       h("td", {}, units.number(value * row.display_factor)),
       h("td", { className: "unit" }, row.display_unit));
   }));
-  $("#cost-now").textContent = last === undefined || last === null ? "Not started yet."
+  const before = ["queued", "running"].includes(job.state) ? "Not started yet." : "";
+  $("#cost-now").textContent = last === undefined || last === null ? before
     : `${units.number(last, 4)} after ${history.length} steps, ${simulations} simulations`;
 }
 
@@ -133,11 +134,11 @@ function estimateRow(estimate) {
 /** Fit percent of every run, fitted or held out. */
 function scores(job, holdouts) {
   const { result } = job;
-  const fitted = job.runs.map((run) => [run.name, "fitted",
-    result.fit_percent[run.name] ?? result.fit_percent[run.id]]);
-  const names = new Map(get("measurements").map(({ id, name }) => [id, name]));
+  const inFit = distinct(job.runs.map(({ name }) => name));
+  const fitted = job.runs.map(({ id, name }, k) =>
+    [nameOf(id) ?? name, "fitted", result.fit_percent[inFit[k]]]);
   const unseen = Object.entries(holdouts).map(([id, score]) =>
-    [names.get(id) ?? id, "held out", score]);
+    [nameOf(id) ?? "deleted", "held out", score]);
   const channels = [...new Set([...fitted, ...unseen].flatMap(([, , score]) =>
     score && typeof score === "object" ? Object.keys(score) : []))];
   return h("table", { className: "scores" },
@@ -145,7 +146,7 @@ function scores(job, holdouts) {
       channels.map((channel) => h("th", { scope: "col" }, short(channel))))),
     h("tbody", {}, [...fitted, ...unseen].map(([name, role, score]) =>
       h("tr", { className: role === "fitted" ? "" : "held-out" },
-        h("th", { scope: "row", title: name }, h("span", { className: "run-name" }, breakable(name.replace(/\.\w+$/, ""))),
+        h("th", { scope: "row", title: name }, h("span", { className: "run-name" }, breakable(name.replace(/\.\w+(?= \(|$)/, ""))),
           h("span", { className: "soft" }, ` ${role}`)),
         typeof score === "string"
           ? h("td", { colSpan: channels.length || 1 }, worded(score))

@@ -1,6 +1,7 @@
 // Which ride is simulated: a measured one (the rims' motion prescribed) or a manoeuvre on a road.
 
 import { $, h } from "./dom.js";
+import { nameOf } from "./names.js";
 import { get, on, set } from "./store.js";
 
 /** Where a single bump or hole lies, m ahead of the standing car's CG. */
@@ -53,7 +54,7 @@ function list() {
   const posts = get("manoeuvres").filter((m) => m.kind === "posts");
   $("#ride").replaceChildren(...[
     group("Measured: the car follows the recorded rims", usable.map((m) =>
-      [`measurement ${m.id}`, m.name, ""])),
+      [`measurement ${m.id}`, nameOf(m.id), ""])),
     group("Manoeuvres on a road", roads.map((m) =>
       [`manoeuvre ${m.key}`, m.name, m.description])),
     group("Four-post rig", posts.map((m) => [`manoeuvre ${m.key}`, m.name, m.description])),

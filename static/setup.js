@@ -1,6 +1,7 @@
 // What an identification is told: which runs, which parameters are free, between which bounds.
 
 import { breakable, h, symbol } from "./dom.js";
+import { nameOf } from "./names.js";
 import * as preparation from "./preparation.js";
 import { get } from "./store.js";
 import * as units from "./units.js";
@@ -44,18 +45,18 @@ export function view() {
         "The fit starts from the sliders. Bounds that are not typed follow the start."),
       h("table", { className: "free" },
         h("thead", {}, h("tr", {}, ["Free", "Parameter", "Start", "Lower", "Upper", "Unit"].map((text) =>
-          h("th", { scope: "col" }, text)))),
+          h("th", { scope: "col", className: text === "Unit" ? "unit" : "" }, text)))),
         h("tbody", {}, get("parameters").map(freeRow)))));
 }
 
 function runRow(run) {
   const role = roleOf(run);
   return h("li", {},
-    h("span", { className: "run-name", title: run.name }, breakable(run.name)),
+    h("span", { className: "run-name", title: nameOf(run.id) }, breakable(nameOf(run.id))),
     run.usable_for_identification
       ? h("span", { className: "run-use" },
           select(ROLES, role, (value) => { choice.roles[run.id] = value; },
-            { "aria-label": `Use of ${run.name}` }),
+            { "aria-label": `Use of ${nameOf(run.id)}` }),
           h("label", {}, "brakes", preparation.brakingField(run)))
       : h("span", { className: "badge", title: `It lacks ${run.missing.join(", ")}.` },
         "not for fitting"));

@@ -177,6 +177,30 @@ def test_typed_bounds_hold_and_the_others_follow_the_slider(visitor):
     assert float(lower.input_value()) == 30 * 0.05
 
 
+def test_files_of_one_name_are_told_apart(visitor):
+    visitor.click("#tab-measurements")
+    add_file(visitor, "detailed_manoeuvre_1.csv", short_run())
+    visitor.until("ridetune.state('measurements').length === 3")
+    rides = visitor.element("#ride optgroup >> nth=0").locator("option").all_inner_texts()
+    assert rides == [
+        "detailed_manoeuvre_1.csv",
+        "detailed_manoeuvre_2.csv",
+        "detailed_manoeuvre_1.csv (2)",
+    ]
+    visitor.click("#tab-identification")
+    for name in rides:
+        use = visitor.page.get_by_label(f"Use of {name}", exact=True)
+        use.select_option("holdout" if name == rides[1] else "fit")
+    free_only(visitor, "KF")
+    visitor.click("#start")
+    visitor.until("ridetune.state('fit') !== null", 120)
+    fits = visitor.look("ridetune.job().result.fit_percent")
+    rows = visitor.element(".scores tbody tr").all_inner_texts()
+    for name, row in zip((rides[0], rides[2]), rows, strict=False):
+        assert name.replace(".csv", "") in row.replace("\n", "")
+        assert f"{fits[name]['chassis.z']:.1f}" in row.replace("−", "-")
+
+
 def test_a_choice_keeps_focus_and_place(visitor):
     """By keyboard alone one fixes the last parameters of the list and looks at the fit."""
     visitor.click("#tab-identification")

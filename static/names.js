@@ -1,0 +1,16 @@
+// Names of recordings, told apart where two files are called the same.
+
+import { get } from "./store.js";
+
+/** The names, numbered from the second that is the same, as the engine numbers its runs. */
+export const distinct = (names) => names.map((name, k) => {
+  const alike = names.slice(0, k).filter((earlier) => earlier === name).length;
+  return alike ? `${name} (${alike + 1})` : name;
+});
+
+/** What the page calls a recording, or null for one that is gone. */
+export function nameOf(id) {
+  const rows = get("measurements");
+  const at = rows.findIndex((row) => row.id === id);
+  return at < 0 ? null : distinct(rows.map(({ name }) => name))[at];
+}
