@@ -2,7 +2,7 @@
 
 import { $, debounced, h, tabs } from "./dom.js";
 import { CORNERS, locate } from "./poses.js";
-import { AXIS, decadeLabels, decades } from "./plots.js";
+import { AXIS, COLOURS, decadeLabels, decades } from "./plots.js";
 import { density } from "./spectrum.js";
 import { get, on } from "./store.js";
 import { clock, onTime, seek } from "./timeline.js";
@@ -15,11 +15,11 @@ const GROUPS = {
   tyre: ["Tyres", CORNERS.map((c) => `tyre.${c}.load`)],
   seat: ["Seat", ["seat.driver.a_z", `${SPECTRUM}seat.driver.a_z`, "chassis.a_x", "chassis.v_x"]],
 };
-// Okabe and Ito's colours: told apart with any colour vision, and by their strokes as well.
+// The reference is dashed, so that not the colour alone tells it.
 const RUNS = [
-  { key: "measured", label: "measured", stroke: "#c9ced6", width: 1, dash: [] },
-  { key: "reference", label: "baseline", stroke: "#56b4e9", width: 1.2, dash: [6, 4] },
-  { key: "now", label: "now", stroke: "#e69f00", width: 1.6, dash: [] },
+  { key: "measured", label: "measured", stroke: COLOURS.measured, width: 1, dash: [] },
+  { key: "reference", label: "baseline", stroke: COLOURS.reference, width: 1.2, dash: [6, 4] },
+  { key: "now", label: "now", stroke: COLOURS.now, width: 1.6, dash: [] },
 ];
 const SYNC = "ride";
 const FREQUENCIES = [0.2, 30];

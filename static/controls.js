@@ -93,6 +93,17 @@ function row(parameter, side) {
     field.value = units.short(get("values")[name] * factor);
     before.value = get("values")[name];
   };
+  /** Arrows move by the slider's step, as far as a car goes; Escape gives up what was typed. */
+  const keys = (event) => {
+    const at = get("values")[name] * factor;
+    const steps = { ArrowUp: 1, ArrowDown: -1 }[event.key];
+    const typing = get("values")[name] !== before.value || field.value !== units.short(at);
+    if (!steps && !(event.key === "Escape" && typing)) return;
+    event.preventDefault();
+    const next = steps ? Math.round(at / step + steps) * step : before.value * factor;
+    if (isAccepted(next)) change(next);
+    field.value = units.short(get("values")[name] * factor);
+  };
   const slider = h("input", {
     type: "range", id: `slider-${id}`, min: lower, max: upper, step: "any",
     "aria-label": `${parameter.label}, ${unit}`,
@@ -111,6 +122,7 @@ function row(parameter, side) {
       input: typed,
       change: left,
       blur: show,
+      keydown: keys,
     },
   });
   const parts = {

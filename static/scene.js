@@ -1,6 +1,7 @@
 // The 3D view: viser in a frame of our own origin, posed through its bridge (bridge.js).
 
 import { $, h } from "./dom.js";
+import { COLOURS } from "./plots.js";
 import { carMessages, ghostMessages, pivotAt, update, visibility } from "./poses.js";
 import { surface } from "./road.js";
 import { get, on, set } from "./store.js";
@@ -12,7 +13,6 @@ const CAMERAS = {
   front: [[6.2, -0.01, 0.95], [0, 0, 0.55]],
   top: [[0, -0.02, 7.2], [0, 0, 0]],
 };
-const GHOSTS = { reference: [86, 180, 233], measured: [201, 206, 214] };
 const PATIENCE = 12000;
 const SCALE_STEP = 2e-4;
 
@@ -105,6 +105,9 @@ function inject(all) {
   return frame?.contentWindow?.bridge?.inject(messages) ?? false;
 }
 
+/** `#rrggbb` as three bytes. */
+const bytes = (colour) => colour.match(/[\da-f]{2}/gi).map((pair) => parseInt(pair, 16));
+
 function look(name) {
   const [eye, target] = CAMERAS[name];
   inject([
@@ -159,7 +162,7 @@ function place() {
     for (const name of parts) {
       if (!name.startsWith("/ghost/")) continue;
       messages.push(visibility(name, Boolean(ghost)));
-      if (ghost) messages.push(update(name, { colors: new Uint8Array(GHOSTS[kind]) }));
+      if (ghost) messages.push(update(name, { colors: new Uint8Array(bytes(COLOURS[kind])) }));
     }
   }
   const grips = $("#grips").getAttribute("aria-pressed") === "true";

@@ -5,6 +5,7 @@ import signal
 
 import numpy as np
 import pytest
+from ridetune.app.scene import EDGES, GHOST
 
 from .conftest import Service, changed_pixels
 
@@ -416,3 +417,45 @@ def test_the_car_compared_with_is_never_another_than_the_legend_says(visitor):
     charts = visitor.element("#chart-area").inner_text()
     assert "Not simulated." in charts
     assert not re.search(r"\d", charts)
+
+
+def test_a_number_field_steps_by_the_slider_and_gives_up_with_escape(visitor):
+    field = visitor.element("#value-front-pivot-distance")
+    field.click()
+    visitor.page.keyboard.press("ArrowUp")
+    assert visitor.value("front.pivot.distance") == pytest.approx(1.81)
+    assert field.input_value() == "1.81"
+    visitor.page.keyboard.press("Control+A")
+    visitor.page.keyboard.type("3.5")
+    assert visitor.value("front.pivot.distance") == 3.5
+    visitor.page.keyboard.press("Escape")
+    assert visitor.value("front.pivot.distance") == pytest.approx(1.8)
+    assert field.input_value() == "1.8"
+    visitor.settled()
+
+
+def test_runs_have_one_colour_everywhere(visitor):
+    """Legend, lines, numbers and the body in 3D; the eye tells their lightness apart as well."""
+    legend, readings = (
+        visitor.page.evaluate(
+            f"""() => ["measured", "reference", "now"].map((run) =>
+                getComputedStyle(document.querySelector(`{selector}`), `{pseudo}`).{style})"""
+        )
+        for selector, pseudo, style in (
+            ("#legend .key.${run}", "::before", "borderTopColor"),
+            (".reading.${run}", "", "color"),
+        )
+    )
+    lines = visitor.page.evaluate(
+        """async () => {
+            const { COLOURS } = await import("/static/plots.js");
+            const box = document.createElement("i");
+            return ["measured", "reference", "now"].map((run) => {
+                box.style.color = COLOURS[run];
+                return box.style.color;
+            });
+        }"""
+    )
+    assert legend == readings == lines
+    assert lines[1] == f"rgb{GHOST}"
+    assert lines[2] == f"rgb{EDGES}"
