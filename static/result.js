@@ -144,12 +144,13 @@ function scores(job, holdouts) {
   return h("table", { className: "scores" },
     h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Fit, %"),
       channels.map((channel) => h("th", { scope: "col" }, short(channel))))),
-    h("tbody", {}, [...fitted, ...unseen].map(([name, role, score]) =>
-      h("tr", { className: role === "fitted" ? "" : "held-out" },
-        h("th", { scope: "row", title: name }, h("span", { className: "run-name" }, breakable(name.replace(/\.\w+(?= \(|$)/, ""))),
-          h("span", { className: "soft" }, ` ${role}`)),
-        typeof score === "string"
-          ? h("td", { colSpan: channels.length || 1 }, worded(score))
-          : channels.map((channel) => h("td", {},
-            score ? percent(score[channel]).replace(" %", "") : "…"))))));
+    [...fitted, ...unseen].map(([name, role, score]) =>
+      h("tbody", { className: role === "fitted" ? "" : "held-out" },
+        h("tr", {}, h("th", { scope: "rowgroup", colSpan: channels.length + 1, title: name },
+          breakable(name.replace(/\.\w+(?= \(|$)/, "")))),
+        h("tr", {}, h("td", { className: "soft" }, role),
+          typeof score === "string"
+            ? h("td", { className: "said", colSpan: channels.length || 1 }, worded(score))
+            : channels.map((channel) => h("td", {},
+              score ? percent(score[channel]).replace(" %", "") : "…"))))));
 }

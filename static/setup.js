@@ -40,9 +40,8 @@ export function view() {
         "the car predicts what it has not seen."),
       preparation.view()),
     h("section", {},
-      h("h3", {}, "Free parameters"),
-      h("p", { className: "hint" },
-        "The fit starts from the sliders. Bounds that are not typed follow the start."),
+      h("h3", {}, "Free parameters ", h("span", { className: "hint plain" },
+        "start at the sliders; bounds not typed follow")),
       h("table", { className: "free" },
         h("thead", {}, h("tr", {}, ["Free", "Parameter", "Start", "Lower", "Upper", "Unit"].map((text) =>
           h("th", { scope: "col", className: text === "Unit" ? "unit" : "" }, text)))),

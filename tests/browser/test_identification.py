@@ -195,7 +195,7 @@ def test_files_of_one_name_are_told_apart(visitor):
     visitor.click("#start")
     visitor.until("ridetune.state('fit') !== null", 120)
     fits = visitor.look("ridetune.job().result.fit_percent")
-    rows = visitor.element(".scores tbody tr").all_inner_texts()
+    rows = visitor.element(".scores tbody").all_inner_texts()
     for name, row in zip((rides[0], rides[2]), rows, strict=False):
         assert name.replace(".csv", "") in row.replace("\n", "")
         assert f"{fits[name]['chassis.z']:.1f}" in row.replace("−", "-")
@@ -203,6 +203,7 @@ def test_files_of_one_name_are_told_apart(visitor):
 
 def test_a_choice_keeps_focus_and_place(visitor):
     """By keyboard alone one fixes the last parameters of the list and looks at the fit."""
+    visitor.page.set_viewport_size({"width": 1366, "height": 640})
     visitor.click("#tab-identification")
     last = visitor.page.get_by_label("Rear pivot angle is free")
     last.focus()
