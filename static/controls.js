@@ -150,8 +150,8 @@ function row(parameter, side) {
 /** A typed number that no car can have: the value from before the typing comes back. */
 function refuse({ name, label, lower, upper, display_factor: factor, display_unit: unit }, text, before) {
   set({ values: { ...get("values"), [name]: before.value } });
-  const [from, to] = [lower, upper].map((x) => units.number(x * factor));
-  notice("warning", `${label} stays ${units.number(before.value * factor)} ${unit}`,
+  const [from, to] = [lower, upper].map((x) => units.plain(x * factor));
+  notice("warning", `${label} stays ${units.plain(before.value * factor)} ${unit}`,
     `${text} ${unit} is not accepted; give ${from} to ${to} ${unit}.`);
 }
 
@@ -161,7 +161,7 @@ function tellBeyond(parameter) {
   const { slider_lower: from, slider_upper: to } = parameter;
   const value = get("values")[name];
   if (value >= from && value <= to) return;
-  const [shown, lower, upper] = [value, from, to].map((x) => units.number(x * factor));
+  const [shown, lower, upper] = [value, from, to].map((x) => units.plain(x * factor));
   notice("warning", `${label} is now ${shown} ${unit}`,
     `That is beyond its slider, ${lower} to ${upper} ${unit}; the arrow beside it brings the ` +
     "baseline back.");

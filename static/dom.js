@@ -47,8 +47,11 @@ export function symbol(text) {
 const KEYED = "button, input, select, summary";
 const keyOf = (element) => element.id || element.getAttribute("aria-label") || element.textContent;
 
-/** Build a panel anew without losing the reader's place: what scrolls and what has the focus. */
-export function inPlace(panel, rebuild) {
+/**
+ * Build a panel anew without losing the reader's place: what scrolls and what has the focus.
+ * `successor` selects what takes the focus of a control that is no more.
+ */
+export function inPlace(panel, rebuild, successor = null) {
   const boxes = () => [panel, ...panel.querySelectorAll(".scrolls")];
   const tops = new Map(boxes().map((box) => [box.className, box.scrollTop]));
   const focused = panel.contains(document.activeElement) ? keyOf(document.activeElement) : null;
@@ -56,7 +59,7 @@ export function inPlace(panel, rebuild) {
   for (const box of boxes()) box.scrollTop = tops.get(box.className) ?? 0;
   if (!focused) return;
   const again = [...panel.querySelectorAll(KEYED)].find((element) => keyOf(element) === focused);
-  again?.focus({ preventScroll: true });
+  (again ?? (successor && $(successor, panel)))?.focus({ preventScroll: true });
 }
 
 /** Tabs by the ARIA pattern: arrows move, one panel shows. Returns `select(id)`. */

@@ -163,7 +163,7 @@ function show() {
         : h("button", { type: "button", id: "start", className: "primary", on: { click: start } },
             "Identify")),
     view === "setup" ? setup.view() : result.view(job, holdouts, hooks.apply),
-  ));
+  ), "#start, #cancel");
   if (view === "fit") result.advance(job);
 }
 

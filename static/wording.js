@@ -23,8 +23,10 @@ export function worded(text) {
 function inDisplayUnits(text) {
   const named = text.split(PATH).map(units.parameter).filter(Boolean);
   let shown = text;
-  for (const { unit, display_factor: factor, display_unit: display } of named) {
+  for (const { name, unit, display_factor: factor, display_unit: display } of named) {
     if (factor === 1) continue;
+    const bare = new RegExp(`(${escaped(name)} is ${NUMBER})(?=, but must lie)`, "g");
+    shown = shown.replace(bare, `$1 ${unit}`);
     const said = new RegExp(`(${NUMBER})(?:( to | and )(${NUMBER}))? ${escaped(unit)}(?![\\w/^])`, "g");
     const number = (digits) => units.number(Number(digits) * factor);
     shown = shown.replace(said, (_, one, joined, other) =>

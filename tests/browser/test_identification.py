@@ -102,8 +102,9 @@ def test_an_uploaded_file_is_identified(visitor):
 
 def test_an_identification_is_cancelled(visitor):
     visitor.click("#identify")
-    visitor.click("#cancel")
+    visitor.element("#cancel").press("Enter")
     visitor.until("ridetune.job().state === 'cancelled'", 30)
+    assert visitor.page.evaluate("document.activeElement.id") == "start"
     assert visitor.element("#outcome").inner_text() == "Cancelled"
     assert visitor.element("#identify").is_enabled()
     assert visitor.look("ridetune.state('fit')") is None

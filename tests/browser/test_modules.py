@@ -141,6 +141,10 @@ def test_the_spectrum_holds_the_power_of_the_signal(visitor):
             "KF front spring stiffness is 100000 N/mm, but must lie between 0.1000 and 10000 N/mm.",
         ),
         (
+            "car.json: rear.pivot.angle is 90, but must lie between -1.5 and 1.5 rad.",
+            "car.json: φR rear pivot angle is 5157 deg, but must lie between −85.94 and 85.94 deg.",
+        ),
+        (
             "rear.stabilizer_bar.damping starts at 1800 N m s/rad, rear.stabilizer_bar.stiffness "
             "at 18000 N m/rad.",
             "CtorR rear stabilizer bar damping starts at 31.42 N m s/deg, KtorR rear stabilizer "
