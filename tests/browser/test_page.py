@@ -5,7 +5,6 @@ import signal
 
 import numpy as np
 import pytest
-from ridetune.app.scene import EDGES, GHOST
 
 from .conftest import Service, changed_pixels
 
@@ -40,13 +39,6 @@ def seek(visitor, time):
         """(time) => { const slider = document.querySelector("#time"); slider.value = time;
             slider.dispatchEvent(new Event("input")); }""",
         time,
-    )
-
-
-def add_message(visitor, title):
-    visitor.page.evaluate(
-        "async (t) => (await import('/static/notices.js')).notice('info', t, 'More. '.repeat(12))",
-        title,
     )
 
 
@@ -312,99 +304,6 @@ def test_the_page_goes_on_when_the_service_has_been_away(visit, tmp_path):
         service.stop()
 
 
-def test_a_number_no_car_can_have_is_refused_in_place(visitor):
-    """The value from before the typing stays, whatever the first digits would have been."""
-    before = visitor.value(STIFFNESS)
-    field = visitor.element("#value-front-suspension-stiffness")
-    field.click()
-    visitor.page.keyboard.press("Control+A")
-    visitor.page.keyboard.type("50000000")
-    visitor.page.keyboard.press("Tab")
-    notice = visitor.element(".notice.warning")
-    assert "50000000 N/mm is not accepted; give 0.1 to 10000 N/mm" in notice.inner_text()
-    assert visitor.value(STIFFNESS) == before
-    assert float(field.input_value()) == before / 1000
-    visitor.page.keyboard.press("Escape")
-    assert not notice.is_visible()
-
-
-def test_a_number_beyond_the_slider_is_taken_with_a_word(visitor):
-    field = visitor.element("#value-front-suspension-stiffness")
-    field.fill("5000")
-    field.press("Enter")
-    said = visitor.element(".notice.warning").inner_text()
-    assert "Front spring stiffness is now 5000 N/mm" in said
-    assert "beyond its slider, 5 to 100 N/mm" in said
-    assert visitor.value(STIFFNESS) == 5e6
-    visitor.settled()
-
-
-@pytest.mark.parametrize(("width", "height"), [(1366, 768), (1440, 900), (1920, 1080)])
-def test_messages_hide_no_control(visitor, width, height):
-    """Oracle: the browser's own answer to what lies under the middle of each control."""
-    visitor.page.set_viewport_size({"width": width, "height": height})
-    for k in range(4):
-        add_message(visitor, f"A_file_whose_name_has_no_space_and_is_longer_than_the_box_{k}.csv")
-    dismiss = visitor.element(".notice .dismiss").first.bounding_box()
-    hidden = visitor.page.evaluate(
-        """() => [...document.querySelectorAll("button, select, input, [role=separator]")]
-            .filter((e) => e.checkVisibility({ visibilityProperty: true, opacityProperty: true }))
-            .filter((e) => !e.closest("#notices, #parameters, .scrolls, [role=tabpanel]"))
-            .filter((e) => {
-                const box = e.getBoundingClientRect();
-                const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
-                const top = document.elementFromPoint(x, y);
-                return top?.closest("#notices");
-            }).map((e) => e.outerHTML)"""
-    )
-    assert hidden == []
-    messages = visitor.element("#notices").bounding_box()
-    view = visitor.element("#view").bounding_box()
-    assert messages["x"] >= view["x"]
-    assert messages["y"] >= view["y"]
-    assert messages["x"] + messages["width"] <= view["x"] + view["width"]
-    assert dismiss["x"] + dismiss["width"] <= messages["x"] + messages["width"]
-    assert messages["y"] + messages["height"] <= view["y"] + view["height"]
-
-
-def test_messages_leave_by_themselves_unless_they_are_being_read(visitor):
-    visitor.page.clock.install()
-    add_message(visitor, "Read me")
-    message = visitor.element(".notice")
-    message.locator(".dismiss").focus()
-    visitor.page.clock.run_for(60_000)
-    assert message.is_visible()
-    message.locator(".dismiss").blur()
-    visitor.page.clock.run_for(60_000)
-    assert not message.is_visible()
-
-
-def test_what_a_select_shows_is_not_cut_off(visitor):
-    """Oracle: the text's own width in the select's font; 20 px hold the arrow."""
-    visitor.page.select_option("#ride", "manoeuvre 1")
-    visitor.page.select_option("#compare", "7dof")
-    visitor.settled()
-    cut = visitor.page.evaluate(
-        """() => ["#ride", "#road", "#compare"].filter((selector) => {
-            const select = document.querySelector(selector);
-            const pen = document.createElement("canvas").getContext("2d");
-            const style = getComputedStyle(select);
-            pen.font = style.font;
-            const { text } = select.selectedOptions[0];
-            const room = select.clientWidth - 2 * parseFloat(style.paddingLeft) - 20;
-            return pen.measureText(text).width > room || !select.title.startsWith(text);
-        })"""
-    )
-    assert cut == []
-
-
-def test_angles_have_one_unit(visitor):
-    visitor.settled()
-    text = visitor.element("body").inner_text()
-    assert "Pitch, rms" in text
-    assert "°" not in text
-
-
 def test_the_car_compared_with_is_never_another_than_the_legend_says(visitor):
     """On this road the 8-DOF car fails and the 7-DOF car does not."""
     visitor.expect("status of 422")
@@ -419,45 +318,3 @@ def test_the_car_compared_with_is_never_another_than_the_legend_says(visitor):
     charts = visitor.element("#chart-area").inner_text()
     assert "Not simulated." in charts
     assert not re.search(r"\d", charts)
-
-
-def test_a_number_field_steps_by_the_slider_and_gives_up_with_escape(visitor):
-    field = visitor.element("#value-front-pivot-distance")
-    field.click()
-    visitor.page.keyboard.press("ArrowUp")
-    assert visitor.value("front.pivot.distance") == pytest.approx(1.81)
-    assert field.input_value() == "1.81"
-    visitor.page.keyboard.press("Control+A")
-    visitor.page.keyboard.type("3.5")
-    assert visitor.value("front.pivot.distance") == 3.5
-    visitor.page.keyboard.press("Escape")
-    assert visitor.value("front.pivot.distance") == pytest.approx(1.8)
-    assert field.input_value() == "1.8"
-    visitor.settled()
-
-
-def test_runs_have_one_colour_everywhere(visitor):
-    """Legend, lines, numbers and the body in 3D; the eye tells their lightness apart as well."""
-    legend, readings = (
-        visitor.page.evaluate(
-            f"""() => ["measured", "reference", "now"].map((run) =>
-                getComputedStyle(document.querySelector(`{selector}`), `{pseudo}`).{style})"""
-        )
-        for selector, pseudo, style in (
-            ("#legend .key.${run}", "::before", "borderTopColor"),
-            (".reading.${run}", "", "color"),
-        )
-    )
-    lines = visitor.page.evaluate(
-        """async () => {
-            const { COLOURS } = await import("/static/plots.js");
-            const box = document.createElement("i");
-            return ["measured", "reference", "now"].map((run) => {
-                box.style.color = COLOURS[run];
-                return box.style.color;
-            });
-        }"""
-    )
-    assert legend == readings == lines
-    assert lines[1] == f"rgb{GHOST}"
-    assert lines[2] == f"rgb{EDGES}"
