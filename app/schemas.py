@@ -9,13 +9,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, StringConstraints
 
-from ..engine.rims_settings import InitialState, RimsSettings
+from ..engine.rims_settings import LOWEST_CUTOFF, InitialState, RimsSettings
 
 JsonObject = Mapping[str, Any]
 Name = Annotated[str, StringConstraints(min_length=1, max_length=100)]
 Names = Annotated[list[Name], Field(max_length=200)]
 Traction = Literal["exact", "paper"]
-Cutoff = Annotated[FiniteFloat, Field(gt=0)] | None
+Cutoff = Annotated[FiniteFloat, Field(ge=LOWEST_CUTOFF)] | None
 Intervals = Annotated[list[tuple[FiniteFloat, FiniteFloat]], Field(max_length=100)]
 RIMS = RimsSettings()
 

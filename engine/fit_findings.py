@@ -22,6 +22,12 @@ Histories = Mapping[str, Mapping[str, Array]]
 OPPOSITE = -0.5
 """Correlation with the model below which a channel counts as turned over."""
 
+EXCHANGED = {
+    "chassis.pitch": ", unless it is the front and rear wheels whose columns are exchanged",
+    "chassis.roll": ", unless it is the left and right wheels whose columns are exchanged",
+}
+"""What turns a channel over as its own sign does."""
+
 ALIKE = 5.0
 """Factor between measured and model amplitude up to which their signs are compared."""
 
@@ -73,7 +79,7 @@ def wrong_sign(run: str, channel: str, measured: Array, start: Array, fitted: Ar
         if opposed < OPPOSITE and 1.0 / ALIKE < _amplitude_ratio(channel, measured, model) < ALIKE:
             return (
                 f"{channel} of run {run} runs against the model (correlation {opposed:.2f} {when});"
-                " its sign is probably wrong: multiply it by -1."
+                f" its sign is probably wrong: multiply it by -1{EXCHANGED.get(channel, '')}."
             )
     return None
 

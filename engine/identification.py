@@ -145,7 +145,8 @@ def identify(
     fitted = residuals.model(solution.x)
     faults = channel_faults(problem.runs, start, fitted)
     poor = poor_fits(problem.runs, fitted, faults)
-    suspects = {run for run, _ in (*faults, *poor)}
+    # A turned roll or pitch says itself that the wheels may be exchanged instead.
+    suspects = {run for run, _ in poor} - {run for run, _ in faults}
     exchanged = exchanged_wheels(residuals, (x_start, solution.x), suspects)
     wrong = bool(faults or exchanged)
     outcome = Outcome.DOUBTFUL if wrong else _outcome(solution.status, estimates, search)

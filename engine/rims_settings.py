@@ -8,8 +8,12 @@ from .errors import SimulationError
 
 InitialState = Literal["equilibrium", "measured"]
 
-LONGEST_STEP = 0.02
-"""Beyond this the cubic splines of the wheels miss their own corners, s."""
+SHORTEST_STEP, LONGEST_STEP = 1e-4, 0.02
+"""Below nothing is gained but memory and patience are lost; above the cubic splines of the wheels
+miss their own corners, s."""
+
+LOWEST_CUTOFF = 0.5
+"""Below even the motion of the body on its springs is filtered away, Hz."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,13 +37,15 @@ class RimsSettings:
         """Refuse settings that mean nothing."""
         for name in ("a_x_cutoff_hz", "rim_cutoff_hz", "output_cutoff_hz"):
             cutoff = getattr(self, name)
-            if cutoff is not None and not 0.0 < cutoff < math.inf:
-                raise SimulationError(f"{name} is {cutoff}; give a positive frequency or none.")
+            if cutoff is not None and not LOWEST_CUTOFF <= cutoff < math.inf:
+                raise SimulationError(
+                    f"{name} is {cutoff}; give a frequency of at least {LOWEST_CUTOFF} Hz, or none."
+                )
         if self.initial_state not in get_args(InitialState):
             raise SimulationError(
                 f'initial_state is "{self.initial_state}"; it can be "equilibrium" or "measured".'
             )
-        if not 0.0 < self.step <= LONGEST_STEP:
+        if not SHORTEST_STEP <= self.step <= LONGEST_STEP:
             raise SimulationError(
-                f"step is {self.step} s; give a positive one of at most {LONGEST_STEP} s."
+                f"step is {self.step} s; give one from {SHORTEST_STEP} to {LONGEST_STEP} s."
             )

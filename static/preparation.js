@@ -44,7 +44,7 @@ export function view() {
           "aria-label": `Low-pass of the ${what}, Hz; empty for none`,
           on: { change: () => {
             const hertz = field.value === "" ? null : Number(field.value);
-            if (hertz === null || hertz > 0) change({ [key]: hertz });
+            if (hertz === null || Number.isFinite(hertz)) change({ [key]: hertz });
             else field.value = get("rimsSettings")[key] ?? "";
           } },
         });

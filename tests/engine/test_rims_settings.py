@@ -10,7 +10,9 @@ from ridetune.engine.rims_settings import RimsSettings
         {"rim_cutoff_hz": float("nan")},
         {"output_cutoff_hz": -1.0},
         {"initial_state": "running"},
+        {"a_x_cutoff_hz": 1e-9},
         {"step": 0.0},
+        {"step": 1e-9},
         {"step": 0.1},
     ],
 )
