@@ -29,6 +29,7 @@ from .channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
 from .demand import rolling_resistance
 from .errors import MeasurementError
 from .filters import is_uniform, smoothed, too_coarse
+from .initial_state import away_from_equilibrium, measured_state
 from .recording_checks import check_recording
 from .rims_settings import RimsSettings
 from .vehicle import Vehicle
@@ -45,13 +46,6 @@ COARSEST = 0.1
 
 LONGEST_GAP = 1.0
 """A pause in a record beyond which nothing is known of the wheels, s."""
-
-START_WINDOW = 0.2
-"""The start of a record from which its initial state is taken, s."""
-
-AT_REST = {"chassis.z": 0.02, "chassis.pitch": math.radians(1.0), "chassis.roll": math.radians(1.0)}
-"""Rates with which a car may start for equilibrium to be a good initial state, SI; a body that
-bounces at 1.2 Hz through 3 mm exceeds the first."""
 
 FAST = 1.0
 """Speed that a_x must have taken away for a start in motion to be told of, m/s."""
@@ -134,7 +128,7 @@ def prepare(run: Run, vehicle: Vehicle, settings: RimsSettings | None = None) ->
         *check_recording(run),
         *unknown_start,
         *unbraked,
-        *([] if measured else _moving_start(run)),
+        *([] if measured else away_from_equilibrium(run, vehicle)),
     ]
 
     columns = np.column_stack(
@@ -153,7 +147,7 @@ def prepare(run: Run, vehicle: Vehicle, settings: RimsSettings | None = None) ->
         time=time,
         node_time=nodes,
         stage_inputs=np.stack([columns[:-2:2], columns[1::2], columns[2::2]], axis=1),
-        start_state=_measured_start(run) if measured else None,
+        start_state=measured_state(run) if measured else None,
         sample_step=step,
         sample_fraction=fraction,
         on_nodes=bool(np.all(np.minimum(fraction, 1.0 - fraction) < 1e-6)),
@@ -245,41 +239,3 @@ def _sampling_warnings(run: Run, settings: RimsSettings) -> list[str]:
         for channel, cutoff in filters.items()
         if cutoff is not None and too_coarse(step, cutoff)
     ]
-
-
-def _moving_start(run: Run) -> list[str]:
-    """A body that moves where the model starts from equilibrium, by a line through 0.2 s."""
-    first = _first_samples(run)
-    since = run.time[first] - run.time[0]
-    moving = [
-        name
-        for name, limit in AT_REST.items()
-        if name in run
-        and abs(np.polynomial.polynomial.polyfit(since, run[name][first], 1)[1]) > limit
-    ]
-    if not moving:
-        return []
-    return [
-        f"Run {run.name} starts in motion ({', '.join(moving)}), but the model starts from "
-        'equilibrium; begin the run at rest, or take the initial state "measured".'
-    ]
-
-
-def _first_samples(run: Run) -> NDArray[np.int64]:
-    first = np.flatnonzero(run.time - run.time[0] <= START_WINDOW)
-    return first if len(first) >= FEWEST_SAMPLES else np.arange(FEWEST_SAMPLES)
-
-
-def _measured_start(run: Run) -> Array:
-    """z, pitch, roll and their rates at the first sample, from a cubic through the first 0.2 s."""
-    missing = [name for name in OUTPUT_CHANNELS if name not in run]
-    if missing:
-        raise MeasurementError(
-            f"Run {run.name} lacks {', '.join(missing)}; a measured start needs all three of "
-            "chassis.z, .pitch and .roll, so start from equilibrium instead."
-        )
-    first = _first_samples(run)
-    since = run.time[first] - run.time[0]
-    states = np.column_stack([run[name][first] for name in OUTPUT_CHANNELS])
-    cubic = np.polynomial.polynomial.polyfit(since, states, 3)
-    return np.concatenate([cubic[0], cubic[1]])

@@ -35,7 +35,7 @@ def test_a_noise_free_twin_is_found_exactly():
     assert found.converged
     assert found.vehicle.value("rear.pivot.angle") == found.parameters[-1].value
     [sentence] = found.warnings
-    assert "starts in motion" in sentence  # as the stand-in does
+    assert "starts away from rest" in sentence  # as the stand-in does
 
 
 def test_estimates_and_errors_are_those_of_linear_least_squares():

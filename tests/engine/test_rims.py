@@ -3,6 +3,7 @@ import pytest
 from numpy.testing import assert_allclose
 from ridetune.engine.channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
 from ridetune.engine.errors import MeasurementError
+from ridetune.engine.problem import DEFAULT_NOISE
 from ridetune.engine.rims import prepare
 from ridetune.engine.rims_settings import RimsSettings
 
@@ -143,10 +144,35 @@ def test_a_start_in_motion_is_told_unless_it_is_taken_as_measured(channel, rate)
     channels = dict.fromkeys(OUTPUT_CHANNELS, np.zeros_like(time))
     for moving, told in ((rate * np.sin(time), True), (0.2 * rate * np.sin(time), False)):
         run = still_run(time, **{**channels, channel: moving})
-        sentence = f"starts in motion ({channel})"
+        sentence = f"starts away from rest ({channel})"
         assert (sentence in " ".join(prepare(run, CAR).warnings)) is told
         measured = RimsSettings(initial_state="measured")
         assert sentence not in " ".join(prepare(run, CAR, measured).warnings)
+
+
+def test_a_squatting_start_is_told_and_a_start_from_equilibrium_is_not():
+    """Steady squat has no rate; noise of twice the default and a body that takes the slope of its
+    wheels are no reason."""
+    time, rng = np.linspace(0.0, 2.0, 401), np.random.default_rng(5)
+    noise = {name: 2 * DEFAULT_NOISE[name] * rng.normal(size=401) for name in OUTPUT_CHANNELS}
+    squat = {**noise, "chassis.pitch": noise["chassis.pitch"] - np.radians(0.5)}
+    assert "starts away from rest (chassis.pitch)" in " ".join(
+        prepare(still_run(time, **squat), CAR).warnings
+    )
+    uphill = {f"wheel.{corner}.z": np.full(401, 0.02) for corner in ("fl", "fr")}
+    nose_up = -0.02 / CAR.wheelbase
+    level = 0.02 * CAR.rear.cg_distance / CAR.wheelbase
+    on_slope = {"chassis.z": noise["chassis.z"] + level, "chassis.roll": noise["chassis.roll"]}
+    on_slope["chassis.pitch"] = noise["chassis.pitch"] + nose_up
+    for fine in (noise, {**uphill, **on_slope}):
+        assert "away from rest" not in " ".join(prepare(still_run(time, **fine), CAR).warnings)
+
+
+def test_a_measured_start_needs_samples_to_see_the_rate():
+    time = np.linspace(0.0, 4.0, 81)
+    channels = dict.fromkeys(OUTPUT_CHANNELS, 0.01 * np.sin(8.0 * time))
+    with pytest.raises(MeasurementError, match="5 samples in its first 0.2 s"):
+        prepare(still_run(time, **channels), CAR, RimsSettings(initial_state="measured"))
 
 
 def test_missing_channels_are_all_named():
