@@ -203,12 +203,12 @@ def _usable_start(residuals: Residuals, x: Array) -> tuple[Array, list[str]]:
         if channel_faults(residuals.problem.runs, start, start):
             return x, []
     reach = np.where([one.logarithmic for one in residuals.problem.free], 1.0, 2.0)
+    spread = Halton(len(x), scramble=False).random(SCATTERED_STARTS)
     near = np.maximum(residuals.lower, x - reach), np.minimum(residuals.upper, x + reach)
     for where, (lower, upper) in (
         ("near them", near),
         ("between the bounds", (residuals.lower, residuals.upper)),
     ):
-        spread = Halton(len(x), scramble=False).random(SCATTERED_STARTS)
         trials = [lower + (upper - lower) * share for share in spread]
         squares = residuals.squares(trials)
         best = int(np.argmin(squares))

@@ -51,6 +51,7 @@ def cache_folder() -> Path:
     return Path(tempfile.mkdtemp(prefix=f"ridetune-{name}-"))
 
 
+# Numba makes its settings at run time, out of sight of the type checker.
 config.CACHE_DIR = str(cache_folder())  # pyright: ignore[reportAttributeAccessIssue]
 
 inlined: Callable[[Callable], Any] = numba.njit(forceinline=True, **_ARITHMETIC)

@@ -36,6 +36,7 @@ def _address(context, builder, signature, args, row):
 def loader(record: Any) -> Callable[..., Any]:
     """Function (buffer, first row, LANES, lane) -> record."""
     size = len(record._fields)
+    # Numba makes its settings at run time, out of sight of the type checker.
     if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
         return lambda buffer, first, lanes, lane: record(
             *(buffer[(first + row) * lanes + lane] for row in range(size))
@@ -60,6 +61,7 @@ def loader(record: Any) -> Callable[..., Any]:
 def storer(record: Any) -> Callable[..., None]:
     """Function (buffer, first row, LANES, lane, record) that stores the record's fields."""
     size = len(record._fields)
+    # Numba makes its settings at run time, out of sight of the type checker.
     if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
 
         def store_in_python(buffer, first, lanes, lane, value):
