@@ -74,7 +74,8 @@ def uncertainty(blocks: Sequence[tuple[Array, Array]], scale: Array) -> Uncertai
     n = len(scale)
     jacobian = np.concatenate([block_jacobian for _, block_jacobian in blocks]) * scale
     _, singular, directions = np.linalg.svd(np.linalg.qr(jacobian, mode="r"))
-    known = singular > max(DIRECTION_TOLERANCE * singular[0], LEAST_EFFECT)
+    least = max(DIRECTION_TOLERANCE * singular[0], LEAST_EFFECT)
+    known = singular > least
     undetermined = np.any(np.abs(directions[~known]) > PART_OF_DIRECTION, axis=0)
     inverse_root = directions[known].T / singular[known]
     bread = inverse_root @ inverse_root.T
@@ -95,11 +96,10 @@ def uncertainty(blocks: Sequence[tuple[Array, Array]], scale: Array) -> Uncertai
     np.fill_diagonal(correlation, 1.0)
     std_error = np.where(undetermined, np.inf, std_error * scale)
     quantile = float(student_t.ppf(0.5 + CONFIDENCE / 2.0, freedom))
+    effect = np.linalg.norm(jacobian, axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        alone = scale * np.sqrt(np.diag(meat)) / np.sum(jacobian**2, axis=0)
-    return Uncertainty(
-        std_error, quantile * std_error, quantile * np.nan_to_num(alone, nan=np.inf), correlation
-    )
+        alone = np.where(effect > least, scale * np.sqrt(np.diag(meat)) / effect**2, np.inf)
+    return Uncertainty(std_error, quantile * std_error, quantile * alone, correlation)
 
 
 def smoothed_autocovariance(residuals: Array) -> Array:

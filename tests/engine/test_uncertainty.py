@@ -127,3 +127,12 @@ def test_a_perfect_fit_has_no_error():
     jacobian = slow_regressors(100)
     found = uncertainty([(np.zeros(100), jacobian)], SCALE)
     assert_allclose(found.std_error, 0.0, atol=0.0)
+
+
+def test_a_parameter_that_moves_the_runs_by_rounding_alone_is_not_excited():
+    """Oracle: in exact arithmetic the third column is zero, and the runs say nothing of it."""
+    jacobian = slow_regressors(500)
+    jacobian[:, 2] *= 1e-13
+    found = uncertainty([(np.zeros(500), jacobian)], SCALE)
+    assert np.isinf(found.alone[2])
+    assert_allclose(found.alone[:2], 0.0)
