@@ -31,6 +31,9 @@ EXCHANGED = {
 ALIKE = 5.0
 """Factor between measured and model amplitude up to which their signs are compared."""
 
+SPAN = (2.0, 98.0)
+"""Percentiles between which amplitudes are compared; single spikes lie outside."""
+
 STANDING = {"chassis.z": 0.1, "chassis.pitch": 0.06, "chassis.roll": 0.06}
 """Standard deviation (m, rad) beyond which a model has fallen over and is no witness."""
 
@@ -65,8 +68,12 @@ def correlation(measured: Array, model: Array) -> float:
 
 def _amplitude_ratio(channel: str, measured: Array, model: Array) -> float:
     """Measured over model amplitude; 0 for a model that never moves or has fallen over."""
-    amplitude = float(np.std(model))
-    return float(np.std(measured)) / amplitude if 0.0 < amplitude < STANDING[channel] else 0.0
+    if not 0.0 < float(np.std(model)) < STANDING[channel]:
+        return 0.0
+    measured_span, model_span = (
+        float(np.ptp(np.percentile(one, SPAN))) for one in (measured, model)
+    )
+    return measured_span / model_span if model_span > 0.0 else 0.0
 
 
 def wrong_sign(run: str, channel: str, measured: Array, start: Array, fitted: Array) -> str | None:
@@ -145,17 +152,15 @@ def poor_fits(
     runs: Sequence[ComparedRun],
     fitted: Histories,
     faults: Mapping[tuple[str, str], Sequence[str]],
-) -> dict[tuple[str, str], str]:
-    """By run and channel, a sentence on one followed badly for no fault already found."""
-    found = {
-        (seen.name, channel): poor_fit(
-            seen.name, channel, measured, fitted[seen.name][channel], seen.noise[channel]
-        )
+) -> list[str]:
+    """Sentences on channels followed badly for no fault already found."""
+    found = (
+        poor_fit(seen.name, channel, measured, fitted[seen.name][channel], seen.noise[channel])
         for seen in runs
         for channel, measured in seen.measured.items()
         if (seen.name, channel) not in faults
-    }
-    return {place: sentence for place, sentence in found.items() if sentence}
+    )
+    return [sentence for sentence in found if sentence]
 
 
 def bound_findings(estimates: Sequence[ParameterEstimate]) -> list[str]:

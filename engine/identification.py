@@ -21,11 +21,10 @@ from .errors import ProblemError
 from .fit import CONVERGED, Fit, FittedRun, Outcome, ParameterEstimate, Progress, determined
 from .fit_findings import bound_findings, channel_faults, poor_fits, undetermined_findings
 from .parameters import parameter
-from .problem import FreeParameter, Problem
+from .problem import ComparedRun, FreeParameter, Problem
 from .residuals import FAILED_TRIAL, Residuals, Simulate
 from .simulation import fit_percent, rims_batch
 from .uncertainty import Uncertainty, uncertainty
-from .wheel_order import exchanged_wheels
 
 __all__ = ["Fit", "FreeParameter", "Outcome", "Problem", "Progress", "identify"]
 
@@ -120,7 +119,6 @@ def identify(
     )
     x_start, moved = _usable_start(residuals, x_start)
     start = residuals.model(x_start)
-    at_start = channel_faults(problem.runs, start, start)
 
     search = _Search(residuals, progress)
     solution = least_squares(
@@ -132,7 +130,9 @@ def identify(
         ftol=COST_TOLERANCE,
         xtol=STEP_TOLERANCE,
         gtol=GRADIENT_TOLERANCE,
-        max_nfev=min(most_evaluations, EVALUATIONS_ON_A_FAULT) if at_start else most_evaluations,
+        max_nfev=min(most_evaluations, EVALUATIONS_ON_A_FAULT)
+        if _in_doubt(residuals, x_start)
+        else most_evaluations,
     )
     r = residuals.vector(solution.x)
     places = [block.place for block in residuals.blocks()]
@@ -143,12 +143,9 @@ def identify(
     values = problem.values(solution.x)
     estimates = _estimates(problem, values, errors)
     fitted = residuals.model(solution.x)
-    faults = channel_faults(problem.runs, start, fitted)
-    poor = poor_fits(problem.runs, fitted, faults)
-    # A turned roll or pitch says itself that the wheels may be exchanged instead.
-    suspects = {run for run, _ in poor} - {run for run, _ in faults}
-    exchanged = exchanged_wheels(residuals, (x_start, solution.x), suspects)
-    wrong = bool(faults or exchanged)
+    driven = _well_driven(problem)
+    faults = channel_faults(driven, start, fitted)
+    wrong = bool(faults) or len(driven) < len(problem.runs)
     outcome = Outcome.DOUBTFUL if wrong else _outcome(solution.status, estimates, search)
     converged = outcome in CONVERGED
     if not converged:
@@ -157,8 +154,7 @@ def identify(
         *(warning for seen in problem.runs for warning in seen.inputs.warnings),
         *moved,
         *(sentence for sentences in faults.values() for sentence in sentences),
-        *exchanged.values(),
-        *poor.values(),
+        *poor_fits(driven, fitted, faults),
         *bound_findings(estimates),
         *(undetermined_findings(estimates, errors) if converged else []),
     ]
@@ -190,7 +186,7 @@ def _usable_start(residuals: Residuals, x: Array) -> tuple[Array, list[str]]:
 
     Start values from which the model fails, or is further from the runs than their mean, can
     lie where the car falls over into another equilibrium, from which no small step leads out.
-    Unless a channel of wrong sign or unit is the reason, a Halton sequence of cars around them is
+    Unless a channel that is probably wrong is the reason, a Halton sequence of cars around them is
     tried and the best taken, if it is much better; if all of them fail, one between the bounds.
     Raises ProblemError when the model fails on every one.
     """
@@ -198,12 +194,11 @@ def _usable_start(residuals: Residuals, x: Array) -> tuple[Array, list[str]]:
     failed = bool(np.any(r == FAILED_TRIAL))
     if r @ r <= residuals.scatter():
         return x, []
-    if not failed:
-        start = residuals.model(x)
-        if channel_faults(residuals.problem.runs, start, start):
-            return x, []
+    if not failed and _in_doubt(residuals, x):
+        return x, []
     reach = np.where([one.logarithmic for one in residuals.problem.free], 1.0, 2.0)
-    spread = Halton(len(x), scramble=False).random(SCATTERED_STARTS)
+    # The sequence begins at the lower bounds.
+    spread = Halton(len(x), scramble=False).fast_forward(1).random(SCATTERED_STARTS)
     near = np.maximum(residuals.lower, x - reach), np.minimum(residuals.upper, x + reach)
     for where, (lower, upper) in (
         ("near them", near),
@@ -220,6 +215,18 @@ def _usable_start(residuals: Residuals, x: Array) -> tuple[Array, list[str]]:
         if not failed:
             return x, []
     raise ProblemError(_failure(residuals.problem))
+
+
+def _well_driven(problem: Problem) -> list[ComparedRun]:
+    """Runs whose wheels and a_x are not in doubt; in the others every output would look wrong."""
+    return [seen for seen in problem.runs if not seen.inputs.faults]
+
+
+def _in_doubt(residuals: Residuals, x: Array) -> bool:
+    """Whether a channel is probably wrong, as the car at x sees it."""
+    runs, model = residuals.problem.runs, residuals.model(x)
+    driven = _well_driven(residuals.problem)
+    return len(driven) < len(runs) or bool(channel_faults(driven, model, model))
 
 
 def _failure(problem: Problem) -> str:

@@ -1,15 +1,21 @@
 """What can be seen wrong with a recording before any model: gaps, rest values, a_x against v_x.
 
-Every finding is a sentence naming run and channel; none of them stops anything.
+Every finding is a sentence naming run and channel; none of them stops anything, but a fault in
+what drives the model leaves nothing to be learnt from the run.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .channels import Run, channel
 from .filters import low_pass, too_coarse
-from .frames import CORNERS
+from .frames import CORNERS, GRAVITY
+from .wheel_order import exchanged_wheels
+
+Array = NDArray[np.float64]
 
 REST_WINDOW = 0.5
 """The start of a record looked at for rest, s."""
@@ -35,14 +41,39 @@ SLOW = 1.0
 VARIES = 0.2
 """dv_x/dt must vary by this much, m/s2 rms, to be held against a_x."""
 
+LEAST_SLOPE, MOST_SLOPE = 0.35, 2.5
+"""dv_x/dt over a_x between which both are believed: a body-fixed a_x contains some gravity."""
 
-def check_recording(run: Run) -> list[str]:
-    """Findings about one run that has the channels of the rims mode."""
+MISTAKEN_UNITS = (
+    (GRAVITY, "chassis.a_x", "g", "m/s^2"),
+    (1.0 / GRAVITY, "chassis.a_x", "m/s^2", "g"),
+    (3.6, "chassis.v_x", "km/h", "m/s"),
+    (1.0 / 3.6, "chassis.v_x", "m/s", "km/h"),
+)
+"""dv_x/dt over a_x that a mistaken unit makes, whose, the unit of its numbers and its header's."""
+
+UNIT_SPREAD = 1.3
+"""Factor around such a ratio that counts."""
+
+
+class Finding(NamedTuple):
+    """A sentence, and whether what drives the model is wrong by it."""
+
+    sentence: str
+    fault: bool
+
+
+def check_recording(run: Run, distance: Array, wheelbase: float) -> list[Finding]:
+    """Findings about one run that has the channels of the rims mode.
+
+    distance : (samples,) travelled, m
+    wheelbase : m
+    """
     return [
-        *_gaps(run),
-        *_rest_values(run),
+        *(Finding(sentence, False) for sentence in (*_gaps(run), *_rest_values(run))),
         *_acceleration_against_speed(run),
-        *_one_wheel_turned_over(run),
+        *(Finding(sentence, True) for sentence in _one_wheel_turned_over(run)),
+        *(Finding(sentence, True) for sentence in exchanged_wheels(run, distance, wheelbase)),
     ]
 
 
@@ -81,8 +112,11 @@ def _rest_values(run: Run) -> list[str]:
     ]
 
 
-def _acceleration_against_speed(run: Run) -> list[str]:
-    """Fits dv_x/dt = c + s a_x, both below 1 Hz; s is 1 when sign and unit are right."""
+def _acceleration_against_speed(run: Run) -> list[Finding]:
+    """Fits dv_x/dt = c + s a_x, both below 1 Hz; s is 1 when sign and unit are right.
+
+    Only the sense of rolling resistance depends on v_x, so that a wrong v_x is no fault.
+    """
     if "chassis.v_x" not in run or too_coarse(float(np.mean(np.diff(run.time))), SLOW):
         return []
     slow = low_pass(run.time, np.column_stack([run["chassis.v_x"], run["chassis.a_x"]]), SLOW)
@@ -90,17 +124,30 @@ def _acceleration_against_speed(run: Run) -> list[str]:
     if np.std(gained) < VARIES or np.std(a_x) == 0.0:
         return []
     slope = float(np.cov(gained, a_x)[0, 1] / np.var(a_x, ddof=1))
-    if slope < -0.3:
-        return [
-            f"In run {run.name} chassis.a_x runs against the change of chassis.v_x; "
-            "one of them has the wrong sign, so multiply chassis.a_x by -1 if it is that one."
-        ]
-    if not 0.3 < slope < 3.0:
-        return [
-            f"In run {run.name} chassis.v_x changes {slope:.3g} times as fast as chassis.a_x says; "
-            "check the units of both."
-        ]
-    return []
+    if slope < -LEAST_SLOPE:
+        return [_opposed(run, float(np.mean(slow[:, 0])))]
+    if LEAST_SLOPE < slope < MOST_SLOPE:
+        return []
+    changes = f"In run {run.name} chassis.v_x changes {slope:.3g} times as fast as chassis.a_x says"
+    for factor, name, numbers, header in MISTAKEN_UNITS:
+        if 1.0 / UNIT_SPREAD < slope / factor < UNIT_SPREAD:
+            doubt = f"the numbers of {name} are probably in {numbers} under a header that says"
+            return [
+                Finding(f"{changes}; {doubt} {header}: correct the header.", name == "chassis.a_x")
+            ]
+    return [Finding(f"{changes}; check the units of both.", True)]
+
+
+def _opposed(run: Run, mean_speed: float) -> Finding:
+    """a_x against the change of v_x: a car driving forwards has its v_x right."""
+    against = f"In run {run.name} chassis.a_x runs against the change of chassis.v_x"
+    if mean_speed < 0.0:
+        return Finding(
+            f"{against}, which says that the car drives backwards; if it does not, "
+            "multiply chassis.v_x by -1.",
+            False,
+        )
+    return Finding(f"{against}; its sign is probably wrong: multiply chassis.a_x by -1.", True)
 
 
 def _one_wheel_turned_over(run: Run) -> list[str]:

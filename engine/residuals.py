@@ -113,13 +113,6 @@ class Residuals:
             histories.setdefault(block.run, {})[block.channel] = history
         return histories
 
-    def on(self, problem: Problem, x: Array) -> dict[str, dict[str, Array]]:
-        """The same model's histories at x on another problem's runs."""
-        other = Residuals(problem, self._simulate, self._cancelled)
-        histories = other.model(x)
-        self.simulations += other.simulations
-        return histories
-
     def vector(self, x: Array) -> Array:
         """r(x), (samples of all blocks,)."""
         if self._last is None or not np.array_equal(self._last[0], x):

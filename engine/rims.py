@@ -66,6 +66,7 @@ class RimsInputs:
     on_nodes : whether every sample coincides with a node
     braking : (begin, end) where the car is taken to brake, s
     warnings : sentences about the recording
+    faults : those of them that say that what drives the model is wrong
     """
 
     name: str
@@ -78,6 +79,7 @@ class RimsInputs:
     on_nodes: bool
     braking: tuple[Interval, ...] = ()
     warnings: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
 
     @property
     def sample_node(self) -> NDArray[np.int64]:
@@ -105,7 +107,8 @@ class RimsInputs:
 def prepare(run: Run, vehicle: Vehicle, settings: RimsSettings | None = None) -> RimsInputs:
     """Inputs of the rims mode for one run.
 
-    The vehicle matters only for the braking weight (its brakes and rolling resistance).
+    The vehicle matters for the braking weight (its brakes and rolling resistance) and for what is
+    found wrong with the record (its wheelbase and tracks).
     Raises MeasurementError when a channel is missing, the run is too short or braking is marked
     outside it, VehicleError when braking is marked for a vehicle without brakes.
     """
@@ -122,10 +125,11 @@ def prepare(run: Run, vehicle: Vehicle, settings: RimsSettings | None = None) ->
     speed, unknown_start = _speed(run, acceleration)
     intervals, unbraked = braking_of(run, a_x, vehicle, rolling_resistance(vehicle))
     measured = settings.initial_state == "measured"
+    findings = check_recording(run, speed.antiderivative()(time), vehicle.wheelbase)
     warnings = [
         *run.warnings,
         *_sampling_warnings(run, settings),
-        *check_recording(run),
+        *(finding.sentence for finding in findings),
         *unknown_start,
         *unbraked,
         *([] if measured else away_from_equilibrium(run, vehicle)),
@@ -153,6 +157,7 @@ def prepare(run: Run, vehicle: Vehicle, settings: RimsSettings | None = None) ->
         on_nodes=bool(np.all(np.minimum(fraction, 1.0 - fraction) < 1e-6)),
         braking=tuple(intervals),
         warnings=tuple(warnings),
+        faults=tuple(finding.sentence for finding in findings if finding.fault),
     )
 
 
@@ -168,8 +173,8 @@ def _require(run: Run) -> None:
             f"Run {run.name} lacks {', '.join(missing)}; the rims mode needs "
             "time, the four wheel.*.z and chassis.a_x."
         )
-    for name in INPUT_CHANNELS:
-        if not np.all(np.isfinite(run[name])):
+    for name in (*INPUT_CHANNELS, "chassis.v_x"):
+        if name in run and not np.all(np.isfinite(run[name])):
             raise MeasurementError(
                 f"Run {run.name} has gaps (not a number) in {name}; cut the record there."
             )

@@ -1,102 +1,99 @@
-"""Wheel channels in the wrong columns: does the model follow a run better with wheels exchanged?
+"""Wheel channels in each other's columns, found from the recording alone.
 
-Asked only of runs which the fit follows badly. The two sides, the two axles and every pair of
-wheels change places, and the car of the start values and the fitted one are driven by the result.
+On a road the rear wheels pass over what the front wheels passed over, a wheelbase later. With s the
+distance travelled and u(s) a wheel centre's height, u_rl(s + L) is close to u_fl(s) and u_rr(s + L)
+to u_fr(s); across the car and the other way round the likeness is far smaller. Of all ways to hand
+the four columns to the four wheels the right one therefore stands out, whatever the car's springs
+and dampers. A car mirrored left and right passes the same test: the sign of roll tells the two
+apart.
+
+Heights are averaged over CELL, which takes off the sensors' noise, and compared by their rise over
+RISE, which keeps what left and right tracks do not share and hills do not hide.
 """
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
-from itertools import combinations
+from itertools import permutations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
-from .channels import WHEEL_CHANNELS
-from .problem import ComparedRun
-from .residuals import Residuals
-from .simulation import fit_percent
+from .channels import WHEEL_CHANNELS, Run
 
 Array = NDArray[np.float64]
-Histories = Mapping[str, Mapping[str, Array]]
-"""(samples,) by run and channel."""
+Order = tuple[int, ...]
+"""Which column holds each wheel's height, wheels in the order of the corners."""
 
-MUCH_CLOSER = 0.5
-"""A channel counts as followed much better when its squared misfit falls below this share."""
+CELL, RISE = 0.25, 0.5
+"""m"""
 
-NO_FURTHER = 1.5
-"""No other channel's squared misfit may grow by more than this factor."""
+SHORTEST = 50.0
+"""Distance driven, m, below which two tracks can be alike by chance."""
 
-CLEARLY = 0.8
-"""Of two exchanges the one that is named second must leave less than this share of misfit."""
+ALIKE = 0.7
+"""Correlation a wheelbase apart from which an order is believed."""
 
+FAR_LESS = 0.85
+"""The order as given is doubted when its correlation is below this share of the best one's."""
 
-def _orders() -> dict[str, list[int]]:
-    """By name of the exchange, which wheel's channel drives each wheel."""
-    orders = {"left and right wheels": [1, 0, 3, 2], "front and rear wheels": [2, 3, 0, 1]}
-    for one, other in combinations(range(4), 2):
-        order = list(range(4))
-        order[one], order[other] = other, one
-        orders[f"{WHEEL_CHANNELS[one]} and {WHEEL_CHANNELS[other]}"] = order
-    return orders
+TIE = 0.05
+"""Orders whose correlations differ by less are told apart by roll."""
+
+AS_GIVEN: Order = (0, 1, 2, 3)
 
 
-ORDERS = _orders()
+def exchanged_wheels(run: Run, distance: Array, wheelbase: float) -> list[str]:
+    """A sentence where the wheels' columns are probably exchanged.
 
-
-def exchanged_wheels(
-    residuals: Residuals, points: Sequence[Array], runs: Collection[str]
-) -> dict[str, str]:
-    """A sentence by run whose wheels are probably exchanged.
-
-    points : the optimiser's variables of the cars to try, e.g. start and solution
-    runs : names of the runs to look at
+    distance : (samples,) travelled, m; what is driven backwards is not looked at
+    wheelbase : m
     """
-    problem = residuals.problem
-    seen = tuple(one for one in problem.runs if one.name in runs)
-    if not seen:
-        return {}
-    best: dict[str, tuple[float, str]] = {}
-    for x in points:
-        as_given = residuals.model(x)
-        for words, order in ORDERS.items():
-            exchanged = tuple(_exchanged(one, order) for one in seen)
-            trial = residuals.on(replace(problem, runs=exchanged), x)
-            for one in seen:
-                ratio = _misfit_ratio(one, as_given[one.name], trial[one.name])
-                if ratio < CLEARLY * best.get(one.name, (1.0 / CLEARLY, ""))[0]:
-                    best[one.name] = ratio, _sentence(one, words, as_given, trial)
-    return {run: sentence for run, (_, sentence) in best.items()}
+    rises = _rises(run, distance)
+    behind = round(wheelbase / CELL)
+    if rises.shape[1] < behind + SHORTEST / CELL or np.any(np.ptp(rises, axis=1) == 0.0):
+        return []
+    follows = np.corrcoef(rises[:, :-behind], rises[:, behind:])[:4, 4:]
+    likeness = {
+        order: 0.5 * float(follows[order[0], order[2]] + follows[order[1], order[3]])
+        for order in permutations(AS_GIVEN)
+    }
+    best = max(likeness.values())
+    if best < ALIKE or likeness[AS_GIVEN] > FAR_LESS * best:
+        return []
+    order = _by_roll(run, [one for one, value in likeness.items() if value > best - TIE])
+    read = [
+        f"{WHEEL_CHANNELS[wheel]} in column {WHEEL_CHANNELS[column]}"
+        for wheel, column in enumerate(order)
+        if column != wheel
+    ]
+    return [
+        f"In run {run.name} the rear wheels do not pass over what the front wheels did a wheelbase "
+        f"before; they would (correlation {likeness[order]:.2f} instead of "
+        f"{likeness[AS_GIVEN]:.2f}) with {', '.join(read)}: check which column is which wheel."
+    ]
 
 
-def _exchanged(seen: ComparedRun, order: Sequence[int]) -> ComparedRun:
-    """The run with u, u' and u'' of the wheels in another order."""
-    stages = seen.inputs.stage_inputs.copy()
-    for first in (0, 4, 8):
-        stages[:, :, first : first + 4] = stages[:, :, [first + wheel for wheel in order]]
-    return replace(seen, inputs=replace(seen.inputs, stage_inputs=stages))
-
-
-def _misfit_ratio(
-    seen: ComparedRun, given: Mapping[str, Array], trial: Mapping[str, Array]
-) -> float:
-    """Mean over channels of squared misfit after over before; infinite where not much better."""
-    before, after = (
-        np.array([np.sum((model[name] - values) ** 2) for name, values in seen.measured.items()])
-        for model in (given, trial)
+def _rises(run: Run, distance: Array) -> Array:
+    """Rise of each wheel over RISE, (4, cells), at equal distances along the road."""
+    furthest = np.maximum.accumulate(distance)
+    forward = np.flatnonzero(np.diff(furthest, prepend=-np.inf) > 0.0)
+    travelled = furthest[forward]
+    edges = np.arange(travelled[0], travelled[-1], CELL)
+    areas = (
+        cumulative_trapezoid(run[name][forward], travelled, initial=0.0) for name in WHEEL_CHANNELS
     )
-    ratios = after / np.maximum(before, np.finfo(float).tiny)
-    # A car that failed is not a number and follows nothing.
-    if not (np.all(ratios < NO_FURTHER) and np.any(ratios < MUCH_CLOSER)):
-        return np.inf
-    return float(np.mean(ratios))
+    heights = np.array([np.diff(np.interp(edges, travelled, area)) / CELL for area in areas])
+    cells = round(RISE / CELL)
+    return heights[:, cells:] - heights[:, :-cells]
 
 
-def _sentence(seen: ComparedRun, words: str, given: Histories, trial: Histories) -> str:
-    gains = []
-    for channel, measured in seen.measured.items():
-        before, after = (fit_percent(measured, one[seen.name][channel]) for one in (given, trial))
-        gains.append((after - before, f"{channel} from {before:.0f} to {after:.0f} %"))
-    return (
-        f"The model follows run {seen.name} much better with {words} exchanged (fit of "
-        f"{max(gains)[1]}); check which column is which wheel."
-    )
+def _by_roll(run: Run, orders: list[Order]) -> Order:
+    """Of orders equally likely the one whose wheels roll as the chassis does, or the first."""
+    if "chassis.roll" not in run:
+        return orders[0]
+    rolled = run["chassis.roll"] - np.mean(run["chassis.roll"])
+
+    def along(order: Order) -> float:
+        fl, fr, rl, rr = (run[WHEEL_CHANNELS[column]] for column in order)
+        return float((fl - fr + rl - rr) @ rolled)
+
+    return max(orders, key=along)

@@ -40,6 +40,13 @@ def test_a_mistaken_unit_shows_in_the_amplitude(channel, factor, numbers, header
     assert f"in {numbers} under a header that says {header}" in finding
 
 
+def test_a_spike_is_no_mistaken_unit():
+    """One sample 500 times as large multiplies the standard deviation, but not the motion."""
+    spiked = BODY.copy()
+    spiked[700] = 5.0
+    assert wrong_unit("lap", "chassis.z", spiked, BODY) is None
+
+
 def test_a_model_that_has_fallen_over_is_no_witness():
     """A car on its nose by 0.3 rad looks like degrees taken for radians, the other way round."""
     fallen = 0.3 * np.tanh(TIME - 8.0)

@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 from ridetune.engine.channels import INPUT_CHANNELS, Run
 from ridetune.engine.recording_checks import check_recording
 
@@ -12,57 +13,88 @@ def run(time=TIME, **changed):
     return Run("lap", time, {**dict.fromkeys(INPUT_CHANNELS, zero), **changed})
 
 
+def findings(recording):
+    return check_recording(recording, np.zeros_like(recording.time), 2.6)
+
+
 def test_a_clean_recording_gives_no_finding():
-    assert check_recording(run(**{"chassis.a_x": PULL_AWAY, "chassis.v_x": SPEED})) == []
+    assert findings(run(**{"chassis.a_x": PULL_AWAY, "chassis.v_x": SPEED})) == []
 
 
 def test_rest_values_are_named_with_their_size():
-    [finding] = check_recording(
-        run(**{"chassis.z": 0.012 + 0 * TIME, "wheel.rr.z": -0.03 + 0 * TIME})
-    )
-    assert "lap" in finding
-    assert "chassis.z 12 mm" in finding
-    assert "wheel.rr.z -30 mm" in finding
+    [finding] = findings(run(**{"chassis.z": 0.012 + 0 * TIME, "wheel.rr.z": -0.03 + 0 * TIME}))
+    assert "lap" in finding.sentence
+    assert "chassis.z 12 mm" in finding.sentence
+    assert "wheel.rr.z -30 mm" in finding.sentence
+    assert not finding.fault
 
 
 def test_a_car_that_rolls_at_the_start_has_no_rest_value():
     shaken = 0.01 * np.sin(20.0 * TIME)
-    assert check_recording(run(**{"wheel.fl.z": shaken, "chassis.z": 0.02 + 0 * TIME})) == []
+    assert findings(run(**{"wheel.fl.z": shaken, "chassis.z": 0.02 + 0 * TIME})) == []
     rolling = {"chassis.v_x": 10.0 + 0 * TIME, "chassis.z": 0.02 + 0 * TIME}
-    assert check_recording(run(**rolling)) == []
+    assert findings(run(**rolling)) == []
 
 
-def test_acceleration_against_the_change_of_speed_is_found():
-    [finding] = check_recording(run(**{"chassis.a_x": -PULL_AWAY, "chassis.v_x": SPEED}))
-    assert "chassis.a_x" in finding
-    assert "-1" in finding
+def test_acceleration_against_the_change_of_speed_is_a_fault():
+    [finding] = findings(run(**{"chassis.a_x": -PULL_AWAY, "chassis.v_x": SPEED}))
+    assert "multiply chassis.a_x by -1" in finding.sentence
+    assert finding.fault
 
 
-def test_acceleration_in_g_beside_speed_in_metres_a_second_is_found():
-    [finding] = check_recording(run(**{"chassis.a_x": PULL_AWAY / 9.80665, "chassis.v_x": SPEED}))
-    assert "9.81 times" in finding
+def test_a_speed_recorded_backwards_leaves_what_drives_the_model_alone():
+    [finding] = findings(run(**{"chassis.a_x": PULL_AWAY, "chassis.v_x": -SPEED}))
+    assert "multiply chassis.v_x by -1" in finding.sentence
+    assert not finding.fault
+
+
+@pytest.mark.parametrize(
+    ("channel", "factor", "numbers", "header", "fault"),
+    [
+        ("chassis.a_x", 1 / 9.80665, "g", "m/s^2", True),
+        ("chassis.a_x", 9.80665, "m/s^2", "g", True),
+        ("chassis.v_x", 3.6, "km/h", "m/s", False),
+        ("chassis.v_x", 1 / 3.6, "m/s", "km/h", False),
+    ],
+)
+def test_a_mistaken_unit_of_acceleration_or_speed_is_named(channel, factor, numbers, header, fault):
+    """Oracle: the unit's factor. Rolling resistance alone depends on v_x, and on its sense only."""
+    channels = {"chassis.a_x": PULL_AWAY, "chassis.v_x": SPEED}
+    [finding] = findings(run(**{**channels, channel: factor * channels[channel]}))
+    assert f"{channel} are probably in {numbers} under a header that says {header}" in (
+        finding.sentence
+    )
+    assert finding.fault == fault
+
+
+def test_a_factor_that_is_no_unit_s_is_told_of_without_a_guess():
+    [finding] = findings(run(**{"chassis.a_x": PULL_AWAY / 60.0, "chassis.v_x": SPEED}))
+    assert "check the units of both" in finding.sentence
+    assert finding.fault
 
 
 def test_a_constant_offset_of_a_x_is_not_a_wrong_unit():
     moving = {"chassis.a_x": PULL_AWAY + 0.09, "chassis.v_x": SPEED}
-    assert check_recording(run(**moving)) == []
+    assert findings(run(**moving)) == []
 
 
 def test_a_hole_in_the_record_is_found_with_its_place():
     time = np.concatenate([np.arange(0.0, 4.0, 0.005), np.arange(4.8, 10.0, 0.005)])
-    [finding] = check_recording(run(time))
-    assert "between 3.99 and 4.80 s" in finding or "between 4.00 and 4.80 s" in finding
+    [finding] = findings(run(time))
+    assert "between 3.99 and 4.80 s" in finding.sentence or "4.00 and 4.80 s" in finding.sentence
+    assert not finding.fault
 
 
 def test_one_wheel_turned_over_is_found_by_its_neighbour():
     road = 0.02 * np.sin(2.0 * TIME)
     wheels = {name: road for name in INPUT_CHANNELS if name.startswith("wheel")}
-    assert check_recording(run(**wheels)) == []
-    [finding] = check_recording(run(**{**wheels, "wheel.rl.z": -road}))
-    assert "wheel.rl.z and wheel.rr.z" in finding
+    assert findings(run(**wheels)) == []
+    [finding] = findings(run(**{**wheels, "wheel.rl.z": -road}))
+    assert "wheel.rl.z and wheel.rr.z" in finding.sentence
+    assert finding.fault
 
 
 def test_a_rig_that_rolls_the_car_turns_no_wheel_over():
     road = 0.02 * np.sin(2.0 * TIME)
     left = {"wheel.fl.z": road, "wheel.rl.z": road}
-    assert check_recording(run(**left, **{"wheel.fr.z": -road, "wheel.rr.z": -road})) == []
+    assert findings(run(**left, **{"wheel.fr.z": -road, "wheel.rr.z": -road})) == []
