@@ -36,6 +36,9 @@ FEWEST_SAMPLES = 10
 COARSEST_STEP = 0.2
 """Time between samples, s, from which on the unit of time is doubtful."""
 
+SPIKES = 0.01
+"""Share of the samples up to which values too great to be true are spikes, not a wrong unit."""
+
 
 @dataclass(frozen=True, slots=True)
 class _Column:
@@ -112,7 +115,7 @@ def _run(stream: BinaryIO, source: str, noise: Mapping[str, float], description:
     _require_increasing(time, table, source)
     warnings += _doubtful_time(time)
     for column in columns[1:]:
-        warnings += _doubtful_magnitude(column, values[column.info.name])
+        warnings += _doubtful_magnitude(column, time, values[column.info.name])
     known = checked_noise(noise, source)
     warnings += doubtful_noise(known, values)
     return Run(source, time, values, known, tuple(warnings), description)
@@ -236,11 +239,19 @@ def _doubtful_time(time: NDArray[np.float64]) -> list[str]:
     return [f"time advances by {step:.3g} s a sample; is it in ms?"]
 
 
-def _doubtful_magnitude(column: _Column, values: NDArray[np.float64]) -> list[str]:
-    """A warning when a channel's greatest value makes its stated unit doubtful."""
+def _doubtful_magnitude(
+    column: _Column, time: NDArray[np.float64], values: NDArray[np.float64]
+) -> list[str]:
+    """A warning when a channel's greatest value makes its stated unit, or itself, doubtful."""
     info, peak = column.info, float(np.max(np.abs(values)))
     shown = f"{peak / column.factor:.4g} {column.unit or info.unit}"
-    if peak > info.largest:
+    beyond = np.flatnonzero(np.abs(values) > info.largest)
+    if 0 < beyond.size <= SPIKES * values.size:
+        return [
+            f"{info.name} jumps to {shown}, which no car does, for {beyond.size} of {values.size} "
+            f"samples from {time[beyond[0]]:.4g} s on; repair or cut these spikes."
+        ]
+    if beyond.size:
         smaller = to_si(info.display_unit, info.unit)[0] < column.factor
         doubt = f"is it in {info.display_unit}?" if smaller else "check its unit and rest value."
         return [f"{info.name} reaches {shown}; {doubt}"]

@@ -294,6 +294,15 @@ def test_a_doubtful_magnitude_is_questioned(title, peak, warning):
     assert warning in parse({"time [s]": TIME, title: values}).warnings
 
 
+def test_a_spike_is_named_with_its_place_and_not_taken_for_a_unit():
+    time = np.linspace(0.0, 10.0, 2001)
+    values = 0.01 * np.sin(time)
+    values[640] = 5.0
+    [warning] = parse({"time [s]": time, "chassis.z [m]": values}).warnings
+    assert "chassis.z jumps to 5 m" in warning
+    assert "for 1 of 2001 samples from 3.2 s on" in warning
+
+
 @pytest.mark.parametrize(
     ("title", "peak"),
     [
