@@ -163,6 +163,19 @@ def poor_fits(
     return [sentence for sentence in found if sentence]
 
 
+def hardly_moving(runs: Sequence[ComparedRun]) -> list[str]:
+    """Sentences on runs that move little more than their noise."""
+    return [
+        f"In run {seen.name} {', '.join(seen.measured)} move hardly more than their noise; it says "
+        "little of the car, so add a livelier run."
+        for seen in runs
+        if all(
+            float(np.std(values)) < NOISE_EXPLAINS * seen.noise[channel]
+            for channel, values in seen.measured.items()
+        )
+    ]
+
+
 def bound_findings(estimates: Sequence[ParameterEstimate]) -> list[str]:
     """Parameters at a bound."""
     return [_at_bound(one) for one in estimates if one.at_bound]

@@ -19,7 +19,13 @@ from scipy.stats.qmc import Halton
 from .channels import WHEEL_CHANNELS
 from .errors import ProblemError
 from .fit import CONVERGED, Fit, FittedRun, Outcome, ParameterEstimate, Progress, determined
-from .fit_findings import bound_findings, channel_faults, poor_fits, undetermined_findings
+from .fit_findings import (
+    bound_findings,
+    channel_faults,
+    hardly_moving,
+    poor_fits,
+    undetermined_findings,
+)
 from .parameters import parameter
 from .problem import ComparedRun, FreeParameter, Problem
 from .residuals import FAILED_TRIAL, Residuals, Simulate
@@ -155,6 +161,7 @@ def identify(
         *moved,
         *(sentence for sentences in faults.values() for sentence in sentences),
         *poor_fits(driven, fitted, faults),
+        *hardly_moving(driven),
         *bound_findings(estimates),
         *(undetermined_findings(estimates, errors) if converged else []),
     ]

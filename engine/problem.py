@@ -29,8 +29,11 @@ DEFAULT_NOISE = {
 }
 """Standard deviation of a channel's noise where neither the run nor the caller states one."""
 
-MOVES = 2.0
+MOVES = 1.2
 """A channel moves when its standard deviation is more than this many times that of its noise."""
+
+SENSORS_BEST = 0.02
+"""Share of the default noise below which no sensor's own noise is taken to lie."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +137,11 @@ class Problem:
                 f"{samples} samples cannot determine {len(parameters)} parameters; free fewer "
                 "or measure longer."
             )
-        if not any(map(_moves, compared)):
+        if not any(
+            _moves(channel, values, {**run.noise, **(noise or {})}.get(channel))
+            for run, seen in zip(runs, compared, strict=True)
+            for channel, values in seen.measured.items()
+        ):
             raise ProblemError(_at_rest(compared))
         return cls(vehicle, compared, parameters, traction, settings)
 
@@ -257,11 +264,16 @@ def _compared_runs(
     return tuple(found)
 
 
-def _moves(seen: ComparedRun) -> bool:
-    return any(
-        float(np.std(values)) > MOVES * seen.noise[channel]
-        for channel, values in seen.measured.items()
-    )
+def _moves(channel: str, values: Array, stated: float | None) -> bool:
+    """Whether a channel moves more than its noise: as stated, else as the record shows it.
+
+    White noise of deviation s has second differences of deviation sqrt(6) s; a body sampled fast
+    enough has hardly any.
+    """
+    default = DEFAULT_NOISE[channel]
+    seen = float(np.std(np.diff(values, 2))) / math.sqrt(6.0)
+    noise = stated or min(max(seen, SENSORS_BEST * default), default)
+    return float(np.std(values)) > MOVES * noise
 
 
 def _at_rest(runs: Sequence[ComparedRun]) -> str:
@@ -271,7 +283,7 @@ def _at_rest(runs: Sequence[ComparedRun]) -> str:
     return (
         f"Nothing can be learnt from {which}: {', '.join(channels)} "
         f"{'stays within its' if len(channels) == 1 else 'stay within their'} noise; give a run "
-        "in which the car moves, or state the noise if it is smaller."
+        "in which the car moves, or correct the noise if it is stated too large."
     )
 
 

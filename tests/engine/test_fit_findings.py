@@ -1,6 +1,14 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
-from ridetune.engine.fit_findings import dead_sensor, poor_fit, wrong_sign, wrong_unit
+from ridetune.engine.fit_findings import (
+    dead_sensor,
+    hardly_moving,
+    poor_fit,
+    wrong_sign,
+    wrong_unit,
+)
 
 TIME = np.linspace(0.0, 20.0, 2001)
 BODY = 0.01 * np.sin(7.0 * TIME) + 0.003 * np.cos(3.0 * TIME)
@@ -78,3 +86,11 @@ def test_a_dead_channel_is_named():
     assert "never moves" in dead_sensor("lap", "chassis.roll", still, BODY, 5e-4)
     assert dead_sensor("lap", "chassis.roll", still, 1e-3 * BODY, 5e-4) is None
     assert dead_sensor("lap", "chassis.roll", BODY, BODY, 5e-4) is None
+
+
+def test_a_run_that_moves_little_more_than_its_noise_is_told_of():
+    """Oracle: the ratio of the motion's deviation to that of the noise."""
+    run = SimpleNamespace(name="lap", measured={"chassis.z": BODY})
+    for ratio, told in ((1.5, 1), (3.0, 0)):
+        run.noise = {"chassis.z": np.std(BODY) / ratio}
+        assert len(hardly_moving([run])) == told

@@ -137,6 +137,18 @@ def test_a_standing_car_is_refused_unless_its_noise_is_smaller():
     assert Problem.build(CAR, [run], noise={"chassis.z": 0.1 * DEFAULT_NOISE["chassis.z"]})
 
 
+def test_small_motion_of_quiet_sensors_is_no_noise():
+    """A tenth of the default noise, but as slow as only a body moves: no sensor is so slow."""
+    time = 0.005 * np.arange(1001)
+    still = dict.fromkeys(INPUT_CHANNELS, np.zeros_like(time))
+    slow = 0.1 * DEFAULT_NOISE["chassis.z"] * np.sin(9.0 * time)
+    assert Problem.build(CAR, [Run("smooth road", time, {**still, "chassis.z": slow})])
+    stated = {"chassis.z": DEFAULT_NOISE["chassis.z"]}
+    assert "stays within its noise" in refused(
+        CAR, [Run("smooth road", time, {**still, "chassis.z": slow}, stated)]
+    )
+
+
 @pytest.mark.parametrize(
     ("parameter", "logarithmic"),
     [
