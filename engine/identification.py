@@ -7,7 +7,7 @@ tells what the paper's campaign can and cannot determine.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from typing import Any, cast
 
@@ -20,12 +20,14 @@ from .channels import WHEEL_CHANNELS
 from .errors import ProblemError
 from .fit import CONVERGED, Fit, FittedRun, Outcome, ParameterEstimate, Progress, determined
 from .fit_findings import (
+    Histories,
     bound_findings,
     channel_faults,
     hardly_moving,
     poor_fits,
     undetermined_findings,
 )
+from .initial_state import swings_in
 from .parameters import parameter
 from .problem import ComparedRun, FreeParameter, Problem
 from .residuals import FAILED_TRIAL, Residuals, Simulate
@@ -161,6 +163,7 @@ def identify(
         *moved,
         *(sentence for sentences in faults.values() for sentence in sentences),
         *poor_fits(driven, fitted, faults),
+        *_swings(problem, fitted, faults),
         *hardly_moving(driven),
         *bound_findings(estimates),
         *(undetermined_findings(estimates, errors) if converged else []),
@@ -222,6 +225,19 @@ def _usable_start(residuals: Residuals, x: Array) -> tuple[Array, list[str]]:
         if not failed:
             return x, []
     raise ProblemError(_failure(residuals.problem))
+
+
+def _swings(problem: Problem, fitted: Histories, faults: Collection[tuple[str, str]]) -> list[str]:
+    """Sentences on runs that start away from the equilibrium in which the model starts."""
+    if problem.settings.initial_state == "measured":
+        return []
+    accused = {run for run, _ in faults}
+    return [
+        sentence
+        for seen in _well_driven(problem)
+        if seen.name not in accused
+        for sentence in swings_in(seen.name, seen.inputs.time, seen.measured, fitted[seen.name])
+    ]
 
 
 def _well_driven(problem: Problem) -> list[ComparedRun]:

@@ -6,14 +6,13 @@ own that no parameter can explain.
 """
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .channels import OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
+from .channels import OUTPUT_CHANNELS, Run
 from .errors import MeasurementError
-from .frames import CORNERS, axle_of
-from .vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
@@ -23,17 +22,14 @@ WINDOW = 0.2
 FEWEST_SAMPLES = 10
 """Samples in the window without which no rate is taken from it."""
 
-ANGLE_OFF, ANGLE_RATE = math.radians(0.2), math.radians(1.0)
-AT_REST = {
-    "chassis.z": (0.005, 0.02),
-    "chassis.pitch": (ANGLE_OFF, ANGLE_RATE),
-    "chassis.roll": (ANGLE_OFF, ANGLE_RATE),
-}
-"""Distance from the plane of the wheels and rate with which a car may start for equilibrium to be
-a good initial state, SI; a body that bounces at 1.2 Hz through 3 mm exceeds the first rate."""
+FIRST, LATER = 0.4, 1.5
+"""A car's own swing fills the time until FIRST, s, and has died away LATER."""
 
-BEYOND_NOISE = 3.0
-"""Both must also exceed this many of their own standard errors."""
+SWING = {"chassis.z": 2e-3, "chassis.pitch": math.radians(0.15), "chassis.roll": math.radians(0.15)}
+"""Rms distance of the record from the model in the FIRST seconds that is told of, SI."""
+
+MUCH_FURTHER = 1.5
+"""It must exceed the distance LATER, which comes from other causes, by this factor."""
 
 
 def measured_state(run: Run) -> Array:
@@ -58,24 +54,29 @@ def measured_state(run: Run) -> Array:
     return np.concatenate([cubic[0], cubic[1]])
 
 
-def away_from_equilibrium(run: Run, vehicle: Vehicle) -> list[str]:
-    """A sentence where the body starts elsewhere than in equilibrium on its wheels."""
-    since, first = _window(run)
-    expected = _on_its_wheels(run, vehicle)
+def swings_in(
+    name: str, time: Array, measured: Mapping[str, Array], model: Mapping[str, Array]
+) -> list[str]:
+    """A sentence where the model, begun in equilibrium, swings into the record's motion.
+
+    name : the run's
+    time : (samples,) s
+    measured, model : z, pitch and roll, those there are, SI
+    """
+    since = time - time[0]
+    at_first, later = since <= FIRST, since >= LATER
     found = []
-    for name, (most_off, fastest) in AT_REST.items():
-        if name not in run:
-            continue
-        (value, rate), (value_error, rate_error) = _value_and_rate(since, run[name][first])
-        off = abs(value - expected[OUTPUT_CHANNELS.index(name)]) > max(
-            most_off, BEYOND_NOISE * value_error
+    for channel, values in measured.items():
+        off = np.square(values - model[channel])
+        first, rest = (
+            math.sqrt(np.mean(off[part])) if part.any() else 0.0 for part in (at_first, later)
         )
-        if off or abs(rate) > max(fastest, BEYOND_NOISE * rate_error):
-            found.append(name)
+        if first > max(SWING[channel], MUCH_FURTHER * rest):
+            found.append(channel)
     if not found:
         return []
     return [
-        f"Run {run.name} starts away from rest ({', '.join(found)}), but the model starts from "
+        f"Run {name} starts away from rest ({', '.join(found)}), but the model starts from "
         'equilibrium; begin the run at rest, or take the initial state "measured".'
     ]
 
@@ -84,30 +85,3 @@ def _window(run: Run) -> tuple[Array, NDArray[np.int64]]:
     """Times since the first sample, and places, of the samples in the window."""
     first = np.flatnonzero(run.time - run.time[0] <= WINDOW)
     return run.time[first] - run.time[0], first
-
-
-def _value_and_rate(since: Array, values: Array) -> tuple[Array, Array]:
-    """Value and rate at the first sample by a parabola, and their standard errors.
-
-    Of few samples the first value alone is taken, and no rate.
-    """
-    if len(since) < FEWEST_SAMPLES:
-        return np.array([values[0], 0.0]), np.zeros(2)
-    powers = np.vander(since, 3, increasing=True)
-    inverse = np.linalg.pinv(powers)
-    found = inverse @ values
-    residual = values - powers @ found
-    variance = float(residual @ residual) / (len(since) - 3)
-    return found[:2], np.sqrt(variance * np.sum(inverse[:2] ** 2, axis=1))
-
-
-def _on_its_wheels(run: Run, vehicle: Vehicle) -> Array:
-    """z, pitch and roll (3,) of the plane nearest to the four wheel centres' first heights."""
-    rows = []
-    for corner in CORNERS:
-        axle = vehicle.axle_at(corner)
-        ahead = axle.cg_distance if axle_of(corner) == "front" else -axle.cg_distance
-        left = 0.5 * axle.track if corner.endswith("l") else -0.5 * axle.track
-        rows.append([1.0, -ahead, left])
-    heights = np.array([run[name][0] for name in WHEEL_CHANNELS])
-    return np.linalg.lstsq(np.array(rows), heights, rcond=None)[0]

@@ -29,7 +29,7 @@ from .channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
 from .demand import rolling_resistance
 from .errors import MeasurementError
 from .filters import is_uniform, smoothed, too_coarse
-from .initial_state import away_from_equilibrium, measured_state
+from .initial_state import measured_state
 from .recording_checks import check_recording
 from .rims_settings import RimsSettings
 from .vehicle import Vehicle
@@ -107,8 +107,8 @@ class RimsInputs:
 def prepare(run: Run, vehicle: Vehicle, settings: RimsSettings | None = None) -> RimsInputs:
     """Inputs of the rims mode for one run.
 
-    The vehicle matters for the braking weight (its brakes and rolling resistance) and for what is
-    found wrong with the record (its wheelbase and tracks).
+    The vehicle matters for the braking weight (its brakes and rolling resistance) and for the order
+    of the wheels (its wheelbase).
     Raises MeasurementError when a channel is missing, the run is too short or braking is marked
     outside it, VehicleError when braking is marked for a vehicle without brakes.
     """
@@ -132,7 +132,6 @@ def prepare(run: Run, vehicle: Vehicle, settings: RimsSettings | None = None) ->
         *(finding.sentence for finding in findings),
         *unknown_start,
         *unbraked,
-        *([] if measured else away_from_equilibrium(run, vehicle)),
     ]
 
     columns = np.column_stack(

@@ -19,6 +19,7 @@ from .demand import Demand, PiecewiseLinear, PostMotion
 from .errors import SimulationDiverged, SimulationError
 from .filters import smoothed
 from .frames import CORNERS
+from .initial_state import swings_in
 from .integration import check_sound, free_outputs, free_states, rims_outputs, rims_states
 from .manoeuvre import Manoeuvre
 from .output_channels import (
@@ -29,7 +30,7 @@ from .output_channels import (
     torque_channels,
     traction_torques,
 )
-from .rims import RimsInputs, prepare
+from .rims import RimsInputs, filtered_outputs, prepare
 from .rims_settings import RimsSettings
 from .road import Road
 from .stability import check_free_step, check_rims_step
@@ -161,7 +162,7 @@ def simulate_rims(
         _load_shares(result),
         inputs.node_time.size - 1,
         _fit_percent(result, run, settings),
-        (*inputs.warnings, *ignored),
+        (*inputs.warnings, *ignored, *_swing(result, run, settings)),
     )
 
 
@@ -322,6 +323,14 @@ def _fit_percent(simulated: Run, measured: Run, settings: RimsSettings) -> dict[
             histories = (smoothed(run.time, run[name], cutoff) for run in (measured, simulated))
             scores[name] = fit_percent(*histories)
     return scores
+
+
+def _swing(simulated: Run, measured: Run, settings: RimsSettings) -> list[str]:
+    """A sentence where the record starts away from the equilibrium in which the model starts."""
+    if settings.initial_state == "measured":
+        return []
+    outputs = (filtered_outputs(run, settings.output_cutoff_hz) for run in (measured, simulated))
+    return swings_in(measured.name, measured.time, *outputs)
 
 
 def _load_shares(run: Run) -> dict[str, float]:

@@ -3,7 +3,6 @@ import pytest
 from numpy.testing import assert_allclose
 from ridetune.engine.channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
 from ridetune.engine.errors import MeasurementError
-from ridetune.engine.problem import DEFAULT_NOISE
 from ridetune.engine.rims import prepare
 from ridetune.engine.rims_settings import RimsSettings
 
@@ -133,39 +132,6 @@ def test_a_measured_start_takes_states_and_rates_from_the_record():
     assert_allclose(state, [0.01, 0.02, -0.01, 0.2, -0.1, 0.05], rtol=0, atol=1e-9)
     with pytest.raises(MeasurementError, match=r"chassis\.roll.*equilibrium"):
         prepare(cubic_run(time, **{"chassis.z": time}), CAR, RimsSettings(initial_state="measured"))
-
-
-@pytest.mark.parametrize(
-    ("channel", "rate"),
-    [("chassis.z", 0.05), ("chassis.pitch", 0.03), ("chassis.roll", -0.03)],
-)
-def test_a_start_in_motion_is_told_unless_it_is_taken_as_measured(channel, rate):
-    time = np.linspace(0.0, 2.0, 401)
-    channels = dict.fromkeys(OUTPUT_CHANNELS, np.zeros_like(time))
-    for moving, told in ((rate * np.sin(time), True), (0.2 * rate * np.sin(time), False)):
-        run = still_run(time, **{**channels, channel: moving})
-        sentence = f"starts away from rest ({channel})"
-        assert (sentence in " ".join(prepare(run, CAR).warnings)) is told
-        measured = RimsSettings(initial_state="measured")
-        assert sentence not in " ".join(prepare(run, CAR, measured).warnings)
-
-
-def test_a_squatting_start_is_told_and_a_start_from_equilibrium_is_not():
-    """Steady squat has no rate; noise of twice the default and a body that takes the slope of its
-    wheels are no reason."""
-    time, rng = np.linspace(0.0, 2.0, 401), np.random.default_rng(5)
-    noise = {name: 2 * DEFAULT_NOISE[name] * rng.normal(size=401) for name in OUTPUT_CHANNELS}
-    squat = {**noise, "chassis.pitch": noise["chassis.pitch"] - np.radians(0.5)}
-    assert "starts away from rest (chassis.pitch)" in " ".join(
-        prepare(still_run(time, **squat), CAR).warnings
-    )
-    uphill = {f"wheel.{corner}.z": np.full(401, 0.02) for corner in ("fl", "fr")}
-    nose_up = -0.02 / CAR.wheelbase
-    level = 0.02 * CAR.rear.cg_distance / CAR.wheelbase
-    on_slope = {"chassis.z": noise["chassis.z"] + level, "chassis.roll": noise["chassis.roll"]}
-    on_slope["chassis.pitch"] = noise["chassis.pitch"] + nose_up
-    for fine in (noise, {**uphill, **on_slope}):
-        assert "away from rest" not in " ".join(prepare(still_run(time, **fine), CAR).warnings)
 
 
 def test_a_measured_start_needs_samples_to_see_the_rate():
