@@ -14,19 +14,20 @@ class StartError(RideError):
 
 
 class ServiceError(RideError):
-    """A request that the service itself refuses."""
+    """A request that the service itself refuses; `field` is the place in it where there is one."""
 
-    status = 400
+    status: int
 
-    def __init__(self, message: str, *, retry_after: int | None = None):
+    def __init__(self, message: str, *, field: str | None = None, retry_after: int | None = None):
         super().__init__(message)
+        self.field = field
         self.headers = {} if retry_after is None else {"Retry-After": str(retry_after)}
 
 
-class BadRequest(ServiceError):
-    """The request cannot be read."""
+class InvalidRequest(ServiceError):
+    """The request can be read, but parts of it are missing or contradict each other."""
 
-    code = "bad-request"
+    code, status = "invalid-request", 422
 
 
 class Forbidden(ServiceError):

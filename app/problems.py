@@ -13,7 +13,7 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
 from ..engine.errors import RideError
-from .errors import ServiceError
+from .errors import InvalidRequest, ServiceError
 
 log = logging.getLogger(__name__)
 
@@ -45,7 +45,9 @@ def problem(
 def reply_to(error: RideError) -> JSONResponse:
     """Problem details of an error that the caller can mend."""
     if isinstance(error, ServiceError):
-        return problem(error.status, error.code, str(error), headers=error.headers)
+        return problem(
+            error.status, error.code, str(error), field=error.field, headers=error.headers
+        )
     return problem(422, error.code, str(error))
 
 
@@ -58,8 +60,14 @@ def reply_to_errors(app: FastAPI) -> None:
 
     @app.exception_handler(RequestValidationError)
     async def invalid_request(_: Request, error: RequestValidationError) -> JSONResponse:
+        if isinstance(error.body, bytes):
+            return problem(
+                415,
+                "unsupported-media-type",
+                "The body is not sent as JSON; send it with Content-Type: application/json.",
+            )
         field, detail = _first_complaint(error)
-        return problem(422, "invalid-request", detail, field=field)
+        return problem(422, InvalidRequest.code, detail, field=field)
 
     @app.exception_handler(HTTPException)
     async def http_error(_: Request, error: HTTPException) -> JSONResponse:
@@ -80,11 +88,6 @@ def reply_to_errors(app: FastAPI) -> None:
 def _first_complaint(error: RequestValidationError) -> tuple[str, str]:
     complaints = error.errors()
     first = complaints[0]
-    if first["type"] == "json_invalid":
-        return (
-            "body",
-            f"The body is not JSON: {first['ctx']['error']} at character {first['loc'][-1]}.",
-        )
     place = ".".join(str(part) for part in first["loc"] if part != "body")[:120] or "body"
     said = {
         "missing": "is missing",

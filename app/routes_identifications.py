@@ -9,7 +9,7 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from ..engine.vehicle_file import vehicle_from_json, vehicle_to_json
 from .access import SessionId
-from .errors import BadRequest, NotFound
+from .errors import InvalidRequest, NotFound
 from .frames import clean
 from .identification_job import KIND, build_problem, check_budget, marked_runs
 from .job_store import Job
@@ -58,9 +58,10 @@ def _submitted(services: Services, sid: str, body: IdentificationRequest) -> dic
     spec["vehicle"] = vehicle_to_json(vehicle_from_json(vehicle))
     spec["runs"] = [{"id": one.id, "name": one.name} for one in kept]
     if strangers := set(body.braking) - {one.id for one in kept}:
-        raise BadRequest(
+        raise InvalidRequest(
             f"Braking is marked for {min(strangers)}, which is not among the runs; leave it out or "
-            "add the run."
+            "add the run.",
+            field="braking",
         )
     problem = build_problem(spec, marked_runs(spec, kept, services.recordings))
     spec["names"] = [parameter.name for parameter in problem.free]

@@ -16,7 +16,7 @@ from ..engine.road_specs import road_spec_from_json
 from ..engine.simulation import simulate_posts, simulate_rims, simulate_road
 from ..engine.vehicle import Vehicle
 from ..engine.vehicle_file import vehicle_from_json
-from .errors import BadRequest, NotFound, OverBudget
+from .errors import InvalidRequest, NotFound, OverBudget
 from .recordings import Recordings, with_braking
 from .schemas import SimulationRequest
 from .settings import Limits
@@ -56,7 +56,7 @@ def plan(
     """The simulation asked for, checked against the work budget; reads what it needs."""
     asked = [name for name in ("manoeuvre", "rims", "posts") if getattr(request, name) is not None]
     if len(asked) > 1:
-        raise BadRequest(f"The request has {' and '.join(asked)}; leave one of them.")
+        raise InvalidRequest(f"The request has {' and '.join(asked)}; leave one of them.")
     for name in request.channels or ():
         channel(name)
     vehicle = _vehicle(request, session, store)
@@ -97,7 +97,9 @@ def _drive(request: SimulationRequest, vehicle: Vehicle, limits: Limits) -> Task
     manoeuvre = known_manoeuvre(asked) if isinstance(asked, str) else manoeuvre_from_json(asked)
     if request.road is not None:
         if manoeuvre.kind != "road":
-            raise BadRequest("A rig test has no road; leave out road or choose another manoeuvre.")
+            raise InvalidRequest(
+                "A rig test has no road; leave out road or choose another manoeuvre."
+            )
         manoeuvre = replace(manoeuvre, road=road_spec_from_json(request.road))
     _check_budget(manoeuvre.duration, min(request.step, request.sample_step), limits)
     simulate = simulate_road if manoeuvre.kind == "road" else simulate_posts
@@ -124,7 +126,7 @@ def _follow(
 ) -> Task:
     """A measurement: its wheel centres or its posts."""
     if request.road is not None:
-        raise BadRequest("A recording has its road in it; leave out road.")
+        raise InvalidRequest("A recording has its road in it; leave out road.")
     if rims := request.rims:
         kept = store.measurement(session, rims.measurement)
         _check_recording(kept, limits)

@@ -1,4 +1,5 @@
-"""Request bodies as JSON means them: no NaN, no infinity, nothing too deep to walk.
+"""Request bodies as I-JSON (RFC 7493) means them: no NaN, no infinity, no key twice, nothing too
+deep to walk.
 
 Python's reader is more generous than the standard, and what it lets in (NaN, 1e999) cannot be
 written back, so a reply that mentions it would fail.
@@ -31,14 +32,14 @@ class StrictRoute(APIRoute):
 
 
 class StrictRequest(Request):
-    """A request whose `json` refuses what JSON does not have."""
+    """A request whose `json` refuses what I-JSON does not have."""
 
     async def json(self) -> Any:
-        """Parsed body; HTTP 400 with a sentence for one that is not JSON."""
+        """Parsed body; HTTP 400 with a sentence for one that cannot be read."""
         try:
             return loads(await self.body())
-        except json.JSONDecodeError:
-            raise
+        except json.JSONDecodeError as error:
+            raise HTTPException(400, _not_json(error)) from None
         except RecursionError:
             raise HTTPException(400, _TOO_DEEP) from None
         except ValueError as error:
@@ -46,7 +47,7 @@ class StrictRequest(Request):
 
 
 def loads(body: bytes) -> Any:
-    """Value of a JSON text in UTF-8; ValueError with a sentence for what JSON does not have."""
+    """Value of a JSON text in UTF-8; ValueError with a sentence for what I-JSON does not have."""
     try:
         text = body.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -66,6 +67,10 @@ def loads(body: bytes) -> Any:
 
 _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 _TOO_DEEP = f"The body is nested deeper than {DEEPEST} levels; send a flatter one."
+
+
+def _not_json(error: json.JSONDecodeError) -> str:
+    return f"The body is not JSON: {error.msg} at character {error.pos}; correct it there."
 
 
 def _no_constant(name: str) -> NoReturn:

@@ -9,7 +9,7 @@ from fastapi import Depends, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import UploadFile
 
-from .errors import BadRequest, TooLarge
+from .errors import InvalidRequest, TooLarge
 
 LONGEST_NAME = 100
 IN_MEMORY = 1_000_000
@@ -56,7 +56,9 @@ async def _received(request: Request, name: str = "") -> AsyncIterator[Upload]:
         async with request.form(max_files=1, max_fields=5) as form:
             file = form.get("file")
             if not isinstance(file, UploadFile):
-                raise BadRequest('The form has no file; send it in a part called "file".')
+                raise InvalidRequest(
+                    'The form has no file; send it in a part called "file".', field="file"
+                )
             yield Upload(harmless(name or file.filename or ""), file.file)
         return
     with SpooledTemporaryFile(max_size=IN_MEMORY) as file:

@@ -72,7 +72,7 @@ def test_marked_braking_and_settings_are_used_and_kept(engineer):
         "braking": {run: [[12.0, 15.0]]},
     }
     stranger = engineer.post("/identifications", json={**asked, "braking": {"x": [[1, 2]]}})
-    assert (stranger.status_code, "not among the runs" in stranger.text) == (400, True)
+    assert (stranger.status_code, "not among the runs" in stranger.text) == (422, True)
     beyond = engineer.post("/identifications", json={**asked, "braking": {run: [[50, 60]]}})
     assert (beyond.status_code, "mark a time in it" in beyond.text) == (422, True)
     job = engineer.post("/identifications", json=asked).json()["id"]

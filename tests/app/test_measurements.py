@@ -130,7 +130,7 @@ def test_millimetres_under_a_header_of_metres_are_pointed_out(visitor):
 def test_a_form_without_a_file_is_refused(visitor):
     for form in ({"files": {"other": ("x.csv", b"x")}}, {"files": {"file": (None, "just text")}}):
         reply = visitor.post("/measurements", **form)
-        assert reply.status_code == 400
+        assert (reply.status_code, reply.json()["field"]) == (422, "file")
         assert "file" in reply.json()["detail"]
 
 

@@ -134,7 +134,7 @@ def test_a_road_of_ones_own_replaces_the_manoeuvres(driver):
 
 REFUSED = {
     "unknown manoeuvre": ({"manoeuvre": "3"}, 404, "constant-speed-c"),
-    "two modes": ({"manoeuvre": "2", "rims": {"measurement": "x"}}, 400, "leave one"),
+    "two modes": ({"manoeuvre": "2", "rims": {"measurement": "x"}}, 422, "leave one"),
     "unknown measurement": ({"rims": {"measurement": "x"}}, 404, "measurement"),
     "unknown channel": ({"channels": ["chassis.y"]}, 422, "chassis.y"),
     "unknown parameter": ({"values": {"front.suspension.stifness": 1}}, 422, "stiffness"),
@@ -146,7 +146,7 @@ REFUSED = {
         422,
         "6000000 steps",
     ),
-    "road under a rig": ({"manoeuvre": "heave", "road": {"kind": "flat"}}, 400, "rig"),
+    "road under a rig": ({"manoeuvre": "heave", "road": {"kind": "flat"}}, 422, "rig"),
     "road without kind": ({"road": {"sections": []}}, 422, "kind"),
     "misspelt vehicle": ({"vehicle": {**PAPER, "chasis": {}}}, 422, "chassis"),
     "negative mass": (
