@@ -107,7 +107,7 @@ def _describe_simulate(command: Parser) -> None:
     command.add_argument("--model", choices=("8dof", "7dof"), default="8dof")
     command.add_argument("--lift-off", action="store_true", help="no tyre pulls at the road")
     _add_rims_mode(command, "--braking 6.2:9.8")
-    command.add_argument("--step", metavar="S", type=float, help="longest integration step, s")
+    _add_step(command, "2 ms unless told, 5 ms with --rims")
     command.add_argument("--seed", metavar="N", type=_seed, help="another random road")
     command.add_argument("-o", "--output", metavar="FILE", help="the run as CSV")
 
@@ -121,6 +121,7 @@ def _describe_identify(command: Parser) -> None:
     command.add_argument("--bounds", metavar="NAME=LOW:HIGH", **several, help="SI units")
     command.add_argument("--start", metavar="NAME=VALUE", **several, help="SI units")
     _add_rims_mode(command, "--braking lap_2.csv=6.2:9.8")
+    _add_step(command, "5 ms unless told")
     _add_noise(command, "noise of the recordings")
     command.add_argument("-o", "--output", metavar="FILE", help="the fit as JSON")
 
@@ -163,6 +164,12 @@ def _add_rims_mode(command: Parser, example: str) -> None:
         nargs="+",
         action="extend",
         help=f"when the car brakes, s, in place of what a_x shows; e.g. {example}; none for never",
+    )
+
+
+def _add_step(command: Parser, untold: str) -> None:
+    command.add_argument(
+        "--step", metavar="S", type=float, help=f"longest integration step, s; {untold}"
     )
 
 

@@ -17,7 +17,6 @@ from .store import Measurement, Store
 from .worker import Report
 
 KIND = "identification"
-FINEST_STEP = 0.005
 
 
 def identification(store: Store, recordings: Recordings) -> Kind:
@@ -80,14 +79,16 @@ def identify_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -
     return fit_to_json(fit)
 
 
-def check_budget(measurements: list[Measurement], limits: Limits) -> None:
-    """Refuse recordings that together are longer than an identification may take."""
+def check_budget(measurements: list[Measurement], step: float, limits: Limits) -> None:
+    """Refuse recordings that together are longer than an identification may take.
+
+    step : of the integration, s
+    """
     total = sum(
-        max(kept.summary["samples"], kept.summary["duration"] / FINEST_STEP)
-        for kept in measurements
+        max(kept.summary["samples"], kept.summary["duration"] / step) for kept in measurements
     )
     if total > limits.identified_samples:
         raise OverBudget(
-            f"The runs have {total:.0f} samples together, an identification takes at most "
-            f"{limits.identified_samples}; choose fewer or shorter runs."
+            f"The runs have {total:.0f} samples or steps together, an identification takes at most "
+            f"{limits.identified_samples}; choose fewer or shorter runs, or a longer step."
         )

@@ -52,7 +52,7 @@ async def submit(sid: SessionId, services: Shared, body: IdentificationRequest) 
 
 def _submitted(services: Services, sid: str, body: IdentificationRequest) -> dict[str, Any]:
     kept = [services.store.measurement(sid, measurement) for measurement in body.runs]
-    check_budget(kept, services.settings.limits)
+    check_budget(kept, body.settings.step, services.settings.limits)
     vehicle = services.store.session(sid).vehicle if body.vehicle is None else body.vehicle
     spec = body.model_dump(mode="json", exclude={"key", "runs", "vehicle"})
     spec["vehicle"] = vehicle_to_json(vehicle_from_json(vehicle))

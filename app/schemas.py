@@ -9,7 +9,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, StringConstraints
 
-from ..engine.rims_settings import LOWEST_CUTOFF, InitialState, RimsSettings
+from ..engine.rims_settings import (
+    LONGEST_STEP,
+    LOWEST_CUTOFF,
+    SHORTEST_STEP,
+    InitialState,
+    RimsSettings,
+)
 
 JsonObject = Mapping[str, Any]
 Name = Annotated[str, StringConstraints(min_length=1, max_length=100)]
@@ -27,12 +33,13 @@ class WireForm(BaseModel):
 
 
 class RimsSettingsForm(WireForm):
-    """How recordings are prepared for the rims mode; null for no filter."""
+    """How recordings are prepared for the rims mode; null for no filter, `step` in s."""
 
     a_x_cutoff_hz: Cutoff = RIMS.a_x_cutoff_hz
     rim_cutoff_hz: Cutoff = RIMS.rim_cutoff_hz
     output_cutoff_hz: Cutoff = RIMS.output_cutoff_hz
     initial_state: InitialState = RIMS.initial_state
+    step: Annotated[FiniteFloat, Field(ge=SHORTEST_STEP, le=LONGEST_STEP)] = RIMS.step
 
     def settings(self) -> RimsSettings:
         """The engine's settings."""
@@ -58,7 +65,11 @@ class PostsRequest(WireForm):
 
 
 class SimulationRequest(WireForm):
-    """One simulation of the session's car, or of another one."""
+    """One simulation of the session's car, or of another one.
+
+    road : in place of the manoeuvre's
+    lift_off, step, sample_step : with a manoeuvre or posts; 2 ms and 5 ms unless told
+    """
 
     vehicle: JsonObject | None = None
     values: Annotated[dict[Name, FiniteFloat], Field(max_length=200)] = {}
@@ -68,8 +79,8 @@ class SimulationRequest(WireForm):
     road: JsonObject | None = None
     model: Literal["8dof", "7dof"] = "8dof"
     lift_off: bool = False
-    step: Annotated[FiniteFloat, Field(ge=1e-4, le=0.01)] = 0.002
-    sample_step: Annotated[FiniteFloat, Field(ge=5e-4, le=0.1)] = 0.005
+    step: Annotated[FiniteFloat, Field(ge=1e-4, le=0.01)] | None = None
+    sample_step: Annotated[FiniteFloat, Field(ge=5e-4, le=0.1)] | None = None
     channels: Names | None = None
     max_samples: Annotated[int, Field(ge=2, le=2_000_000)] | None = None
     decimate: Literal["extremes", "stride"] = "extremes"

@@ -13,16 +13,35 @@ from ..engine.channels import Run, channel
 from ..engine.manoeuvre import Manoeuvre, manoeuvre_from_json, reference_manoeuvres
 from ..engine.metrics import metrics
 from ..engine.road_specs import road_spec_from_json
-from ..engine.simulation import simulate_posts, simulate_rims, simulate_road
+from ..engine.simulation import (
+    FREE_STEP,
+    SAMPLE_STEP,
+    Model,
+    simulate_posts,
+    simulate_rims,
+    simulate_road,
+)
 from ..engine.vehicle import Vehicle
 from ..engine.vehicle_file import vehicle_from_json
 from .errors import InvalidRequest, NotFound, OverBudget
 from .recordings import Recordings, with_braking
-from .schemas import SimulationRequest
+from .schemas import RimsRequest, SimulationRequest
 from .settings import Limits
 from .store import Measurement, Store
 
 DEFAULT_MANOEUVRE = "2"
+
+MEANS_NOTHING = {
+    "manoeuvre": {},
+    "rims": {
+        "road": "the recording has its road in it; leave it out",
+        "lift_off": "tyres play no part; leave it out",
+        "step": "give it as rims.settings.step",
+        "sample_step": "the result has the recording's own times; leave it out",
+    },
+    "posts": {"road": "a rig has none; leave it out"},
+}
+"""By mode, what of a request would change nothing, and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -57,11 +76,16 @@ def plan(
     asked = [name for name in ("manoeuvre", "rims", "posts") if getattr(request, name) is not None]
     if len(asked) > 1:
         raise InvalidRequest(f"The request has {' and '.join(asked)}; leave one of them.")
+    _refuse_what_means_nothing(request, asked[0] if asked else "manoeuvre")
     for name in request.channels or ():
         channel(name)
     vehicle = _vehicle(request, session, store)
-    if request.rims is not None or request.posts is not None:
-        return _follow(request, vehicle, session, store, recordings, limits)
+    if request.rims is not None:
+        kept = store.measurement(session, request.rims.measurement)
+        return _follow(request.rims, request.model, vehicle, kept, recordings, limits)
+    if request.posts is not None:
+        kept = store.measurement(session, request.posts.measurement)
+        return _shake(request, vehicle, kept, recordings, limits)
     return _drive(request, vehicle, limits)
 
 
@@ -98,77 +122,79 @@ def _drive(request: SimulationRequest, vehicle: Vehicle, limits: Limits) -> Task
     if request.road is not None:
         if manoeuvre.kind != "road":
             raise InvalidRequest(
-                "A rig test has no road; leave out road or choose another manoeuvre."
+                "A rig test has no road; leave out road or choose another manoeuvre.", field="road"
             )
         manoeuvre = replace(manoeuvre, road=road_spec_from_json(request.road))
-    _check_budget(manoeuvre.duration, min(request.step, request.sample_step), limits)
+    how = _how(request, manoeuvre.duration, limits)
     simulate = simulate_road if manoeuvre.kind == "road" else simulate_posts
-    return Task(
-        vehicle,
-        lambda: simulate(
-            vehicle,
-            manoeuvre,
-            model=request.model,
-            lift_off=request.lift_off,
-            step=request.step,
-            sample_step=request.sample_step,
-        ),
-    )
+    return Task(vehicle, lambda: simulate(vehicle, manoeuvre, **how))
 
 
 def _follow(
-    request: SimulationRequest,
+    rims: RimsRequest,
+    model: Model,
     vehicle: Vehicle,
-    session: str,
-    store: Store,
+    kept: Measurement,
     recordings: Recordings,
     limits: Limits,
 ) -> Task:
-    """A measurement: its wheel centres or its posts."""
-    if request.road is not None:
-        raise InvalidRequest("A recording has its road in it; leave out road.")
-    if rims := request.rims:
-        kept = store.measurement(session, rims.measurement)
-        _check_recording(kept, limits)
-        return Task(
-            vehicle,
-            lambda: simulate_rims(
-                vehicle,
-                with_braking(recordings.run(kept), rims.braking),
-                traction=rims.traction,
-                settings=rims.settings.settings(),
-                model=request.model,
-            ),
-        )
-    assert request.posts is not None
-    kept = store.measurement(session, request.posts.measurement)
-    _check_recording(kept, limits)
+    """A measurement's wheel centres."""
+    settings = rims.settings.settings()
+    duration = kept.summary["duration"]
+    _check_budget(duration, max(kept.summary["samples"], duration / settings.step), limits)
     return Task(
         vehicle,
-        lambda: simulate_posts(
+        lambda: simulate_rims(
             vehicle,
-            recordings.run(kept),
-            model=request.model,
-            lift_off=request.lift_off,
-            step=request.step,
-            sample_step=request.sample_step,
+            with_braking(recordings.run(kept), rims.braking),
+            traction=rims.traction,
+            settings=settings,
+            model=model,
         ),
     )
 
 
-def _check_recording(kept: Measurement, limits: Limits) -> None:
-    finest = kept.summary["duration"] / max(kept.summary["samples"], 1)
-    _check_budget(kept.summary["duration"], min(finest, 0.002), limits)
+def _shake(
+    request: SimulationRequest,
+    vehicle: Vehicle,
+    kept: Measurement,
+    recordings: Recordings,
+    limits: Limits,
+) -> Task:
+    """A measurement's posts."""
+    how = _how(request, kept.summary["duration"], limits)
+    return Task(vehicle, lambda: simulate_posts(vehicle, recordings.run(kept), **how))
 
 
-def _check_budget(duration: float, step: float, limits: Limits) -> None:
+def _how(request: SimulationRequest, duration: float, limits: Limits) -> dict[str, Any]:
+    """What road and posts modes have in common, checked against the work budget."""
+    step = FREE_STEP if request.step is None else request.step
+    sample_step = SAMPLE_STEP if request.sample_step is None else request.sample_step
+    _check_budget(duration, duration / min(step, sample_step), limits)
+    return {
+        "model": request.model,
+        "lift_off": request.lift_off,
+        "step": step,
+        "sample_step": sample_step,
+    }
+
+
+def _refuse_what_means_nothing(request: SimulationRequest, mode: str) -> None:
+    for name, remedy in MEANS_NOTHING[mode].items():
+        if getattr(request, name) not in (None, False):
+            raise InvalidRequest(
+                f"The field {name} means nothing with {mode}: {remedy}.", field=name
+            )
+
+
+def _check_budget(duration: float, steps: float, limits: Limits) -> None:
     if duration > limits.simulated_seconds:
         raise OverBudget(
             f"{duration:.0f} s are asked for, an interactive simulation takes at most "
             f"{limits.simulated_seconds:g} s; shorten it."
         )
-    if (steps := math.ceil(duration / step)) > limits.simulated_steps:
+    if steps > limits.simulated_steps:
         raise OverBudget(
-            f"{steps} steps are asked for, an interactive simulation takes at most "
+            f"{math.ceil(steps)} steps are asked for, an interactive simulation takes at most "
             f"{limits.simulated_steps}; shorten it or take a longer step."
         )

@@ -149,8 +149,14 @@ def simulate_rims(
     inputs = prepare(run, vehicle, settings)
     ignored: tuple[str, ...] = ()
     if model == "7dof":
-        if traction != "exact":
-            ignored = ("The 7-DOF model has no longitudinal motion: traction is ignored.",)
+        untold = RimsSettings()
+        ignored = _ignored(
+            traction=traction != "exact",
+            braking=run.braking is not None,
+            a_x_cutoff_hz=settings.a_x_cutoff_hz != untold.a_x_cutoff_hz,
+            initial_state=settings.initial_state != untold.initial_state,
+            step=settings.step != untold.step,
+        )
         heights = np.column_stack([run[name] for name in WHEEL_CHANNELS])
         heights = smoothed(run.time, heights, settings.rim_cutoff_hz)
         result = replace(baseline.simulate_rims(vehicle, run.time, heights, points), name=run.name)
@@ -204,13 +210,12 @@ def _free(
             result = baseline.simulate_road(vehicle, demand, sample_step, points)
         result = replace(result, name=name)
         _check_speed(result)
-        ignored = ("The 7-DOF model's tyres never lift off: lift_off is ignored.",)
         return Simulation(
             mode,
             result,
             _load_shares(result),
             inputs.steps.size,
-            warnings=ignored if lift_off else (),
+            warnings=_ignored(lift_off=lift_off, step=step != FREE_STEP),
         )
     car = car_row(vehicle, lift_off)
     check_free_step(car, demand.brake.values.max(axis=0), float(inputs.steps.max()))
@@ -267,6 +272,17 @@ def _rims_run(vehicle: Vehicle, inputs: RimsInputs, traction: Traction, points: 
         }
         channels |= {name: smooth[:, k] for k, name in enumerate(OUTPUT_CHANNELS)}
     return Run(inputs.name, inputs.time, channels)
+
+
+def _ignored(**told: bool) -> tuple[str, ...]:
+    """A warning that lists what was told although the 7-DOF model has no use for it."""
+    names = [name for name, given in told.items() if given]
+    if not names:
+        return ()
+    return (
+        "The 7-DOF model is linear, has no longitudinal motion, starts at rest and takes its own"
+        f" step: {', '.join(names)} {'is' if len(names) == 1 else 'are'} ignored.",
+    )
 
 
 def _require_choice(name: str, value: str, choices: Any) -> None:

@@ -119,7 +119,6 @@ async function finished() {
 /** A run that the fit has not seen, driven by the identified car. */
 async function scoreHoldouts() {
   const fitted = job;
-  const { step: _, ...settings } = fitted.result.settings;
   const used = new Set(fitted.runs.map(({ id }) => id));
   const ids = Object.keys(holdouts).length ? Object.keys(holdouts)
     : get("measurements").filter((m) => m.usable_for_identification && !used.has(m.id))
@@ -128,7 +127,7 @@ async function scoreHoldouts() {
     try {
       const run = await api.simulate({
         vehicle: fitted.result.vehicle,
-        rims: { ...rimsOf(id), traction: fitted.traction, settings },
+        rims: { ...rimsOf(id), traction: fitted.traction, settings: fitted.result.settings },
         channels: ["chassis.z"], max_samples: 10,
       });
       holdouts = { ...holdouts, [id]: run.head.fit_percent };

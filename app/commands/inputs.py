@@ -87,8 +87,9 @@ def rims_settings(options: Namespace) -> RimsSettings:
         text = getattr(options, field)
         if text is not None:
             told[f"{field}_hz"] = None if text == "none" else _frequency(text, field)
-    if options.initial_state:
-        told["initial_state"] = options.initial_state
+    for field in ("initial_state", "step"):
+        if getattr(options, field) is not None:
+            told[field] = getattr(options, field)
     return RimsSettings(**told)
 
 

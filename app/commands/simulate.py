@@ -7,6 +7,7 @@ from typing import Any
 from ...engine.errors import SimulationError
 from ...engine.measurement import read_run, run_to_csv
 from ...engine.road_file import read_road
+from ...engine.road_specs import IsoRoad
 from ...engine.simulation import (
     FREE_STEP,
     Simulation,
@@ -58,6 +59,9 @@ def simulate(options: Namespace) -> None:
 def _road(options: Namespace) -> Simulation:
     vehicle, manoeuvre = find_vehicle(options.vehicle), find_manoeuvre(options.manoeuvre)
     if options.seed is not None:
+        if options.road or not isinstance(manoeuvre.road, IsoRoad):
+            which = options.road or manoeuvre.name
+            raise SimulationError(f"{which} has no random road; leave out --seed.")
         manoeuvre = replace(manoeuvre, seed=options.seed)
     if manoeuvre.kind == "posts":
         if options.road:
@@ -69,14 +73,11 @@ def _road(options: Namespace) -> Simulation:
 
 def _rims(options: Namespace) -> Simulation:
     [run] = with_braking([read_run(options.rims)], options.braking)
-    settings = rims_settings(options)
-    if options.step is not None:
-        settings = replace(settings, step=options.step)
     return simulate_rims(
         find_vehicle(options.vehicle),
         run,
         traction=options.traction or "exact",
-        settings=settings,
+        settings=rims_settings(options),
         model=options.model,
     )
 

@@ -80,6 +80,7 @@ def small_limits(tmp_path) -> Settings:
         unfinished_jobs=1,
         simulated_seconds=30.0,
         simulated_steps=20_000,
+        identified_samples=20_000,
     )
     return Settings(data=tmp_path / "small", limits=limits)
 

@@ -80,6 +80,10 @@ def test_describing_the_commands_imports_no_engine():
         ("simulate --vehicle paper --manoeuvre 1 --road none.csv -o r.csv", "none.csv"),
         ("simulate --vehicle paper --manoeuvre heave --road r.csv -o r.csv", "leave out --road"),
         ("simulate --vehicle paper --manoeuvre 1 --seed -1 -o r.csv", "'-1'"),
+        ("simulate --vehicle paper --manoeuvre bump --seed 3 -o r.csv", "leave out --seed"),
+        ("simulate --vehicle paper --manoeuvre 1 --road r --seed 3 -o r.csv", "leave out --seed"),
+        ("simulate --vehicle paper --rims run.csv --seed 3", "--seed belongs to --manoeuvre"),
+        ("simulate --vehicle paper --rims run.csv --road r.csv", "--road belongs to --manoeuvre"),
         ("simulate --vehicle paper --manoeuvre 1 --traction paper -o r.csv", "--rims"),
         ("simulate --vehicle paper --manoeuvre 1 --rim-cutoff 20 -o r.csv", "--rim-cutoff belongs"),
         ("simulate --vehicle paper --posts r.csv --braking 1:2 -o r.csv", "--braking belongs"),
@@ -108,6 +112,7 @@ def test_bad_command_is_refused_in_one_line_that_names_the_place(folder, capsys,
         ("--start front.pivot.angle", "NAME=VALUE"),
         ("--start front.pivot.angle=two", "'two'"),
         ("--free K_F --fixed K_F", "both as free and as fixed"),
+        ("--step 0.5", "step is 0.5 s"),
         ("--rim-cutoff fast", "--rim-cutoff fast: give a frequency in Hz, or none"),
         ("--a-x-cutoff -3", "a_x_cutoff_hz is -3"),
         ("--braking 2", "BEGIN:END in seconds, or none"),
@@ -258,12 +263,13 @@ def test_how_a_recording_is_prepared_is_the_caller_s_and_is_kept(folder, driven)
     write_run(Run("lap", run.time, {name: 1.1 * run[name] for name in RECORDED}), "lap.csv")
     command = ["identify", str(driven), "lap.csv", "--vehicle", "paper", "--free", "K_F"]
     command += ["--a-x-cutoff", "none", "--rim-cutoff", "30", "--initial-state", "measured"]
+    command += ["--step", "0.004"]
     assert main([*command, "--braking", "1:2"]) == 2
     marks = ["lap.csv=2.5:3", "lap.csv=1:2", f"{driven}=none"]
     assert main([*command, "--braking", *marks, "-o", "fit.json"]) == 0
     fit = json.loads((folder / "fit.json").read_text())
     settings = {"a_x_cutoff_hz": None, "rim_cutoff_hz": 30.0, "output_cutoff_hz": None}
-    settings |= {"initial_state": "measured", "step": 0.005}
+    settings |= {"initial_state": "measured", "step": 0.004}
     assert fit["settings"] == settings
     assert [run["braking"] for run in fit["runs"]] == [[], [[2.5, 3.0], [1.0, 2.0]]]
 

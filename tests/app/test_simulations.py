@@ -90,16 +90,19 @@ def test_a_recording_is_prepared_as_the_request_says(driver):
     recording = driver.upload(path.read_bytes(), "twin.csv").json()["id"]
     car, run = vehicle_from_json(PAPER), replace(read_run(path), braking=((2.0, 6.0),))
     told = {"rim_cutoff_hz": 8.0, "a_x_cutoff_hz": None, "initial_state": "measured"}
+    told["step"] = 0.001
     expected = simulate_rims(car, run, settings=RimsSettings(**told)).run["chassis.pitch"]
-    found = []
+    found, steps = [], []
     for settings, braking in ((told, [[2.0, 6.0]]), (told, None), ({}, [[2.0, 6.0]])):
         rims = {"measurement": recording, "settings": settings, "braking": braking}
         body = {"vehicle": PAPER, "rims": rims, "channels": ["chassis.pitch"]}
-        _, values = read_binary(driver.post("/simulations", json=body, headers=BINARY).content)
+        head, values = read_binary(driver.post("/simulations", json=body, headers=BINARY).content)
         found.append(values["chassis.pitch"])
+        steps.append(head["steps"])
     assert_allclose(found[0], expected, rtol=0, atol=1e-6 * np.abs(expected).max())
     assert np.abs(found[1] - found[0]).max() > 1e-4
     assert np.abs(found[2] - found[0]).max() > 1e-4
+    assert steps == [20_000, 20_000, 4_000]
 
 
 def test_a_rig_test_and_a_recorded_one_agree(driver):
@@ -171,6 +174,48 @@ def test_what_cannot_be_simulated_is_refused_with_a_sentence(driver, name):
     assert reply.status_code == status, reply.text
     assert said in reply.json()["detail"]
     assert reply.json()["detail"][-1] in ".?"
+
+
+MEANS_NOTHING = {
+    "road": ({"kind": "flat"}, "has its road in it"),
+    "lift_off": (True, "tyres play no part"),
+    "step": (0.002, "rims.settings.step"),
+    "sample_step": (0.01, "own times"),
+}
+
+
+@pytest.mark.parametrize("name", MEANS_NOTHING)
+def test_what_would_be_ignored_on_rims_is_refused_with_the_remedy(driver, recording, name):
+    value, remedy = MEANS_NOTHING[name]
+    reply = driver.post("/simulations", json={"rims": {"measurement": recording}, name: value})
+    assert (reply.status_code, reply.json()["field"]) == (422, name)
+    assert remedy in reply.json()["detail"]
+
+
+def test_a_rig_test_takes_a_step_of_its_own_and_no_road(driver):
+    heave = {**driver.client.get("/api/manoeuvres/heave").json(), "duration": 1.0}
+    csv = driver.post("/simulations", json={"manoeuvre": heave}, headers={"Accept": "text/csv"})
+    posts = {"posts": {"measurement": driver.upload(csv.content, "short.csv").json()["id"]}}
+    found = driver.post("/simulations", json={**posts, "step": 0.001, "sample_step": 0.01}).json()
+    assert (found["steps"], found["samples"]) == (1000, 101)
+    reply = driver.post("/simulations", json={**posts, "road": {"kind": "flat"}})
+    assert (reply.status_code, reply.json()["field"]) == (422, "road")
+
+
+def test_the_step_of_rims_counts_in_the_budget(small_limits):
+    """Oracle: a recording of 20 s with 4001 samples, under a limit of 20 000 steps."""
+    with open_client(small_limits) as client:
+        visitor = Visitor(client)
+        recording = visitor.get("/measurements").json()[0]["id"]
+        for step, status in ((0.001, 200), (0.0009, 422)):
+            rims = {"measurement": recording, "settings": {"step": step}}
+            reply = visitor.post("/simulations", json={"rims": rims, "max_samples": 2})
+            assert reply.status_code == status, reply.text
+        assert (reply.json()["code"], "22223 steps" in reply.text) == ("over-budget", True)
+        fit = visitor.post(
+            "/identifications", json={"runs": [recording], "settings": {"step": step}}
+        )
+        assert (fit.json()["code"], "22222 samples or steps" in fit.text) == ("over-budget", True)
 
 
 def test_a_recording_that_spans_too_long_is_refused(driver):

@@ -13,6 +13,7 @@ from ridetune.engine.frames import AXLES, CORNERS, GRAVITY
 from ridetune.engine.integration import free_states
 from ridetune.engine.manoeuvre import manoeuvre_from_json, reference_manoeuvres
 from ridetune.engine.rims import prepare
+from ridetune.engine.rims_settings import RimsSettings
 from ridetune.engine.road import Road
 from ridetune.engine.simulation import (
     rims_batch,
@@ -247,8 +248,16 @@ def test_what_the_seven_dof_model_ignores_is_told(car, driven, short_drive):
     assert plain.warnings == ()
     assert "lift_off is ignored" in lifted.warnings[0]
     assert_allclose(lifted.run["chassis.z"], plain.run["chassis.z"], rtol=0, atol=0)
-    paper = simulate_rims(car, driven, model="7dof", traction="paper").warnings
-    assert "traction is ignored" in paper[-1]
+    finer = simulate_road(car, short_drive, model="7dof", step=0.001)
+    assert "step is ignored" in finer.warnings[0]
+
+    plain = simulate_rims(car, driven, model="7dof")
+    told = RimsSettings(a_x_cutoff_hz=5.0, initial_state="measured", step=0.002)
+    marked = replace(driven, braking=())
+    many = simulate_rims(car, marked, model="7dof", traction="paper", settings=told)
+    names = "traction, braking, a_x_cutoff_hz, initial_state, step are ignored"
+    assert names in many.warnings[-1]
+    assert_allclose(many.run["chassis.z"], plain.run["chassis.z"], rtol=0, atol=0)
 
 
 def test_posts_with_gaps_are_refused(car):
