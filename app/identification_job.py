@@ -39,10 +39,11 @@ def marked_runs(
 def build_problem(spec: Mapping[str, Any], runs: list[Run]) -> Any:
     """The engine's problem; raises what a person can mend."""
     from ..engine.problem import Problem
+    from ..engine.residuals import check_start
     from ..engine.rims_settings import RimsSettings
     from ..engine.vehicle_file import vehicle_from_json
 
-    return Problem.build(
+    problem = Problem.build(
         vehicle_from_json(spec["vehicle"]),
         runs,
         free=spec["free"],
@@ -53,6 +54,8 @@ def build_problem(spec: Mapping[str, Any], runs: list[Run]) -> Any:
         traction=spec["traction"],
         settings=RimsSettings(**spec["settings"]),
     )
+    check_start(problem)
+    return problem
 
 
 def identify_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -> dict[str, Any]:

@@ -15,8 +15,8 @@ with a, b = +h, -h, or both to the same side where a bound is nearer than h. h =
 the formula is of order h^2 = 1e-8 of J, that of rounding (1e-16 m in z against a noise of
 0.5 mm) about 1e-13 / h = 1e-9.
 
-A car that leaves the model's range gives FAILED_TRIAL in every residual: finite, so that the trust
-region shrinks and the search goes on.
+A car that leaves the model's range, or is too stiff for the step, gives FAILED_TRIAL in every
+residual: finite, so that the trust region shrinks and the search goes on.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,6 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .car_rows import car_row
 from .channels import OUTPUT_CHANNELS
 from .equilibrium import static_loads
 from .errors import Cancelled, VehicleError
@@ -34,6 +35,7 @@ from .kernels.lanes import BATCH
 from .problem import Problem
 from .rims import RimsInputs
 from .simulation import Traction
+from .stability import check_rims_step
 from .vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -59,6 +61,13 @@ LOOK_EVERY = 0.05
 """Seconds between two looks at `cancelled`; a batch under way then ends unseen."""
 
 
+def check_start(problem: Problem) -> None:
+    """Raise SimulationError for a step too long for the car at the start values."""
+    car = car_row(problem.vehicle)
+    for seen in problem.runs:
+        check_rims_step(car, seen.inputs.step)
+
+
 @dataclass(frozen=True, slots=True)
 class Block:
     """One run's channel in the residual vector.
@@ -80,11 +89,13 @@ class Residuals:
 
     simulate : the rims mode for a batch of cars
     cancelled : polled every LOOK_EVERY seconds; true raises Cancelled
+    Raises what `check_start` does.
     """
 
     def __init__(
         self, problem: Problem, simulate: Simulate, cancelled: Callable[[], bool] | None = None
     ):
+        check_start(problem)
         self.problem = problem
         ends = [sorted(map(one.variable, (one.lower, one.upper))) for one in problem.free]
         self.lower, self.upper = np.array(ends).T

@@ -82,6 +82,11 @@ class RimsInputs:
     faults: tuple[str, ...] = ()
 
     @property
+    def step(self) -> float:
+        """Longest integration step, s."""
+        return float(np.diff(self.node_time).max())
+
+    @property
     def sample_node(self) -> NDArray[np.int64]:
         """(samples,) the node nearest to each sample."""
         return self.sample_step + np.rint(self.sample_fraction).astype(np.int64)

@@ -33,7 +33,7 @@ from .output_channels import (
 from .rims import RimsInputs, filtered_outputs, prepare
 from .rims_settings import RimsSettings
 from .road import Road
-from .stability import check_free_step, check_rims_step
+from .stability import check_free_step, check_rims_step, stable_on_rims
 from .stepping import prepare_free
 from .vehicle import Vehicle
 
@@ -173,11 +173,17 @@ def simulate_rims(
 
 
 def rims_batch(vehicles: Sequence[Vehicle], inputs: RimsInputs, traction: Traction) -> Array:
-    """z, pitch and roll of many cars on the same rims, (cars, samples, 3); NaN where one failed."""
+    """z, pitch and roll of many cars on the same rims, (cars, samples, 3); NaN where one failed or
+    throughout where the step is too long for one.
+    """
     _require_choice("traction", traction, Traction)
-    states = rims_states(car_rows(vehicles), inputs, traction == "exact")
-    values, rates = states.values[:, :, 1:4], states.values[:, :, 9:12]
-    return inputs.at_samples(values, rates)
+    cars = car_rows(vehicles)
+    stable = stable_on_rims(cars, inputs.step)
+    found = np.full((len(cars), len(inputs.time), 3), np.nan)
+    if stable.any():
+        states = rims_states(cars[stable], inputs, traction == "exact").values
+        found[stable] = inputs.at_samples(states[:, :, 1:4], states[:, :, 9:12])
+    return found
 
 
 def fit_percent(measured: Array, simulated: Array) -> float:
@@ -246,7 +252,7 @@ def _rims_run(vehicle: Vehicle, inputs: RimsInputs, traction: Traction, points: 
     """Channels of the 8-DOF car on its rims, at the recording's times."""
     exact = traction == "exact"
     car = car_row(vehicle)
-    check_rims_step(car, float(np.diff(inputs.node_time).max()))
+    check_rims_step(car, inputs.step)
     states = rims_states(car[np.newaxis], inputs, exact)
     nodal = np.concatenate([inputs.stage_inputs[:1, 0], inputs.stage_inputs[:, 2]])
     check_sound(

@@ -52,27 +52,43 @@ def check_rims_step(car: Array, step: float) -> None:
     """Raise SimulationError for a step too long for a car on its rims, where z, pitch and roll are
     left; arguments as of `check_free_step`.
     """
+    _check(step, _rims_eigenvalues(car[np.newaxis])[0])
+
+
+def stable_on_rims(cars: Array, step: float) -> NDArray[np.bool_]:
+    """Which of many cars (C, CAR_ROWS) on their rims take a step, s: what `check_rims_step` raises
+    for, as data (C,).
+    """
+    return _is_stable(step, _rims_eigenvalues(cars))
+
+
+def _rims_eigenvalues(cars: Array) -> NDArray[np.complex128]:
+    """Eigenvalues (C, 6), 1/s, of many cars on their rims."""
 
     def accelerations(q: Array, rates: Array) -> Array:
         states = np.zeros((len(q), 16))
         states[:, 1:4], states[:, 9:12] = q, rates
-        return rims_outputs(car, states, np.zeros((len(q), 15)), True)[:, 1:4]
+        still = np.zeros((len(q), 15))
+        return np.array([rims_outputs(car, states, still, True)[:, 1:4] for car in cars])
 
-    _check(step, eigenvalues(accelerations, 3))
+    return eigenvalues(accelerations, 3)
 
 
 def eigenvalues(
     accelerations: Callable[[Array, Array], Array], size: int
 ) -> NDArray[np.complex128]:
-    """Eigenvalues (2 size,), 1/s, of q'' = f(q, q') linearised about q = q' = 0.
+    """Eigenvalues (..., 2 size), 1/s, of q'' = f(q, q') linearised about q = q' = 0.
 
-    accelerations : coordinates (n, size), rates (n, size) -> second derivatives (n, size)
+    accelerations : coordinates (n, size), rates (n, size) -> second derivatives (..., n, size), of
+        one system or of many
     """
     steps = _DIFFERENCE * np.eye(2 * size)
     steps = np.vstack([steps, -steps])
     values = accelerations(steps[:, :size], steps[:, size:])
-    slopes = (values[: 2 * size] - values[2 * size :]).T / (2.0 * _DIFFERENCE)
-    jacobian = np.vstack([np.eye(size, 2 * size, size), slopes])
+    slopes = (values[..., : 2 * size, :] - values[..., 2 * size :, :]) / (2.0 * _DIFFERENCE)
+    jacobian = np.zeros((*values.shape[:-2], 2 * size, 2 * size))
+    jacobian[..., :size, size:] = np.eye(size)
+    jacobian[..., size:, :] = np.swapaxes(slopes, -1, -2)
     return np.linalg.eigvals(jacobian).astype(np.complex128)
 
 
@@ -81,20 +97,36 @@ def largest_stable_step(values: NDArray[np.complex128]) -> float:
 
     values : eigenvalues, 1/s. A growing one is taken by its frequency alone.
     """
-    held = np.minimum(values.real, 0.0) + 1j * values.imag
+    held = _held(values)
     sizes = np.abs(held)
     fast = sizes > _ROUNDING * max(sizes.max(), 1.0)
-    z = _RAY * (held[fast] / sizes[fast])[:, np.newaxis]
-    growth = np.abs(1.0 + z * (1.0 + z * (0.5 + z * (1.0 / 6.0 + z / 24.0))))
-    limits = _RAY[np.argmax(growth > 1.0 + _ROUNDING, axis=1)]
+    grows = _growth(_RAY * (held[fast] / sizes[fast])[:, np.newaxis]) > 1.0 + _ROUNDING
+    limits = _RAY[np.argmax(grows, axis=1) - 1]
     return float(np.min(limits / sizes[fast], initial=np.inf))
 
 
+def _held(values: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Eigenvalues of motions that do not grow by themselves."""
+    return np.minimum(values.real, 0.0).astype(np.complex128) + 1j * values.imag
+
+
+def _growth(z: NDArray[np.complex128]) -> Array:
+    """|R(z)|."""
+    return np.abs(1.0 + z * (1.0 + z * (0.5 + z * (1.0 / 6.0 + z / 24.0))))
+
+
+def _is_stable(step: float, values: NDArray[np.complex128]) -> NDArray[np.bool_]:
+    """Whether a step lies within MARGIN of the limit, for eigenvalues (..., n): on a ray RK4 is
+    stable up to the limit and nowhere beyond, so that no search is needed.
+    """
+    return np.all(_growth(step / MARGIN * _held(values)) <= 1.0 + _ROUNDING, axis=-1)
+
+
 def _check(step: float, values: NDArray[np.complex128]) -> None:
-    longest = MARGIN * largest_stable_step(values)
-    if step <= longest:
+    if _is_stable(step, values):
         return
-    fastest, longest = float(np.abs(values).max()), _rounded_down(1e3 * longest)
+    longest = _rounded_down(1e3 * MARGIN * largest_stable_step(values))
+    fastest = float(np.abs(values).max())
     raise SimulationError(
         f"The step of {1e3 * step:.3g} ms is too long for this car, whose fastest motion changes at"
         f" {fastest:.3g} 1/s; take a step of at most {longest:g} ms, or correct its"

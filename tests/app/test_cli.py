@@ -189,13 +189,17 @@ def test_rims_of_a_direct_run_bring_its_body_motion_back(folder, driven, capsys)
 
 
 def test_a_step_too_long_for_the_car_is_refused_with_one_that_it_takes(folder, driven, capsys):
-    """Oracle: the step that the refusal states is taken, in a mode with tyres and on rims."""
+    """Oracle: the step that the refusal states is taken, with tyres, on rims and by a fit."""
     car = reference_vehicles()["paper"].with_values({"front.suspension.damping": 9e5})
     write_vehicle(car, "stiff.json")
     flat = {"name": "still", "kind": "road", "duration": 0.1}
     (folder / "still.json").write_text(json.dumps(flat))
-    for mode in (("--manoeuvre", "still.json", "-o", "r.csv"), ("--rims", str(driven))):
-        command = ("simulate", "--vehicle", "stiff.json", *mode)
+    for mode in (
+        ("simulate", "--manoeuvre", "still.json", "-o", "r.csv"),
+        ("simulate", "--rims", str(driven)),
+        ("identify", str(driven), "--free", "K_F"),
+    ):
+        command = (*mode, "--vehicle", "stiff.json")
         message = refused(capsys, *command)
         longest = re.search(r"take a step of at most (\S+) ms", message)[1]
         assert main([*command, "--step", str(float(longest) / 1000.0)]) == 0

@@ -82,6 +82,20 @@ def test_marked_braking_and_settings_are_used_and_kept(engineer):
     assert result["runs"][0]["braking"] == [[12.0, 15.0]]
 
 
+def test_a_start_too_stiff_for_the_step_is_refused_with_one_that_it_takes(engineer):
+    """Oracle: the step that the refusal states is taken."""
+    run = engineer.get("/measurements").json()[0]["id"]
+    asked = {"runs": [run], "free": ["rear.suspension.stiffness"]}
+    car = read_vehicle(SAMPLES / "paper_vehicle.json")
+    asked["vehicle"] = vehicle_to_json(car.with_values({"front.suspension.damping": 2e5}))
+    refused = engineer.post("/identifications", json=asked)
+    assert (refused.status_code, "too long for this car" in refused.text) == (422, True)
+    longest = float(refused.json()["detail"].split("at most ")[1].split()[0])
+    taken = engineer.post("/identifications", json={**asked, "settings": {"step": longest / 1e3}})
+    assert taken.status_code == 202, taken.text
+    assert engineer.delete(f"/identifications/{taken.json()['id']}").status_code == 204
+
+
 def test_a_running_identification_is_cancelled(engineer):
     runs = [kept["id"] for kept in engineer.get("/measurements").json()][:2]
     job = engineer.post("/identifications", json={"runs": runs}).json()["id"]

@@ -5,20 +5,30 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.engine.car_rows import car_row
+from ridetune.engine.car_rows import car_row, car_rows
 from ridetune.engine.channels import Run
 from ridetune.engine.demand import Demand, PiecewiseLinear
 from ridetune.engine.errors import SimulationError
 from ridetune.engine.frames import CORNERS
-from ridetune.engine.integration import free_states
+from ridetune.engine.integration import free_states, rims_states
 from ridetune.engine.manoeuvre import manoeuvre_from_json, reference_manoeuvres
+from ridetune.engine.problem import Problem
+from ridetune.engine.residuals import Residuals
+from ridetune.engine.rims import prepare
 from ridetune.engine.rims_settings import RimsSettings
-from ridetune.engine.simulation import simulate_posts, simulate_rims, simulate_road
-from ridetune.engine.stability import MARGIN, check_free_step, eigenvalues, largest_stable_step
+from ridetune.engine.simulation import rims_batch, simulate_posts, simulate_rims, simulate_road
+from ridetune.engine.stability import (
+    MARGIN,
+    check_free_step,
+    check_rims_step,
+    eigenvalues,
+    largest_stable_step,
+    stable_on_rims,
+)
 from ridetune.engine.stepping import prepare_free
 from ridetune.engine.vehicle_file import reference_vehicles
 
-from ..factories import paper_vehicle
+from ..factories import paper_vehicle, random_vehicle
 
 STIFF = {"front.suspension.damping": 2e5}
 
@@ -111,6 +121,59 @@ def test_a_step_too_long_is_refused_in_every_mode_with_the_longest_one():
     with pytest.raises(SimulationError, match=r"step of 5 ms is too long .* at most \d\.\d+ ms"):
         simulate_rims(car, run)
     simulate_rims(car, run, settings=RimsSettings(step=0.001))
+
+
+def test_many_cars_at_once_are_judged_like_each_alone():
+    """Oracle: the refusal of one car, found by walking along each eigenvalue's ray."""
+    rng = np.random.default_rng(7)
+    dampings = 10.0 ** rng.uniform(3.0, 5.5, 40)
+    cars = [random_vehicle(rng).with_values({next(iter(STIFF)): c}) for c in dampings]
+    for step in (0.002, 0.005, 0.02):
+        refused = []
+        for car in car_rows(cars):
+            try:
+                check_rims_step(car, step)
+            except SimulationError as error:
+                longest = float(str(error).split("at most ")[1].split()[0])
+                assert longest < 1e3 * step
+                assert stable_on_rims(car[np.newaxis], 1e-3 * longest).all()
+                refused.append(True)
+            else:
+                refused.append(False)
+        assert list(~stable_on_rims(car_rows(cars), step)) == refused
+        assert 0 < sum(refused) < len(refused)
+
+
+def ride(car):
+    """A recording of the car itself over a bump."""
+    return simulate_road(car, replace(reference_manoeuvres()["bump"], duration=3.0)).run
+
+
+def test_an_unstable_car_of_a_batch_fails_and_spoils_no_other():
+    """Oracle: the stable car by itself. The other one is so near to the limit that three seconds do
+    not carry it off: the integrator alone would take it for a car."""
+    car = paper_vehicle()
+    inputs, stiff = prepare(ride(car), car), car.with_values({next(iter(STIFF)): 1.35e5})
+    assert rims_states(car_rows([stiff]), inputs, True).failed[0] < 0
+    found = rims_batch([stiff, car], inputs, "exact")
+    assert np.all(np.isnan(found[0]))
+    assert_allclose(found[1], rims_batch([car], inputs, "exact")[0], rtol=0, atol=1e-12)
+    assert np.all(np.isnan(rims_batch([stiff], inputs, "exact")))
+
+
+def test_a_fit_is_refused_an_unstable_start_and_counts_an_unstable_trial_as_failed():
+    car = paper_vehicle()
+    run, name = ride(car), "front.suspension.damping"
+    bounds = {name: (500.0, 3e5)}
+    with pytest.raises(SimulationError, match=r"step of 5 ms is too long .* at most \d\.\d+ ms"):
+        Residuals(Problem.build(car, [run], [name], bounds=bounds, start=STIFF), rims_batch)
+    shorter = RimsSettings(step=0.001)
+    asked = Problem.build(car, [run], [name], bounds=bounds, start=STIFF, settings=shorter)
+    assert np.isfinite(Residuals(asked, rims_batch).squares([np.zeros(1)])[0])
+
+    residuals = Residuals(Problem.build(car, [run], [name], bounds=bounds), rims_batch)
+    squares = residuals.squares([np.zeros(1), residuals.upper])
+    assert list(np.isfinite(squares)) == [True, False]
 
 
 def test_brakes_near_standstill_bound_the_step():
