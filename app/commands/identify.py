@@ -10,7 +10,8 @@ from ...engine.fit_file import fit_to_json
 from ...engine.identification import identify as fit_to_runs
 from ...engine.measurement import read_run
 from ...engine.problem import Problem
-from .inputs import bounds, find_vehicle, read_noise, rims_settings, starts, with_braking
+from .arguments import bounds, rims_settings, starts, with_braking
+from .inputs import find_vehicle, read_noise
 from .output import (
     print_fit_percent,
     print_table,

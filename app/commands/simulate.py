@@ -15,7 +15,8 @@ from ...engine.simulation import (
     simulate_rims,
     simulate_road,
 )
-from .inputs import find_manoeuvre, find_vehicle, rims_settings, with_braking
+from .arguments import rims_settings, with_braking
+from .inputs import find_manoeuvre, find_vehicle
 from .output import print_fit_percent, print_warnings, require_place, write_file
 
 BELONGS_TO = {
