@@ -7,6 +7,7 @@ imported by the command that runs, so that help is quick.
 
 import argparse
 import os
+import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
@@ -67,6 +68,8 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **settings: Any):
         super().__init__(allow_abbrev=False, **settings)
+        # No option begins with a digit, so whatever does after a minus is a value: -1:2 too.
+        self._negative_number_matcher = re.compile(r"-\.?\d")
 
     def refuse_unknown(self, arguments: Sequence[str]) -> None:
         """Refuse a misspelt command or option before anything else is found missing."""

@@ -58,6 +58,7 @@ def braking_of(
 
 
 def _marked(run: Run) -> list[Interval]:
+    """The marked intervals, cut to the record."""
     first, last = float(run.time[0]), float(run.time[-1])
     for begin, end in run.braking or ():
         if not begin < end:
@@ -70,7 +71,7 @@ def _marked(run: Run) -> list[Interval]:
                 f"Braking is marked in run {run.name} from {begin:g} to {end:g} s, but it lasts "
                 f"from {first:g} to {last:g} s; mark a time in it."
             )
-    return list(run.braking or ())
+    return [(max(begin, first), min(end, last)) for begin, end in run.braking or ()]
 
 
 def find_braking(time: Array, a_x: Array, rolling: float) -> list[Interval]:

@@ -4,11 +4,10 @@ import math
 from argparse import Namespace
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ...engine.channels import Run
+from ...engine.braking import Interval
 from ...engine.errors import RideError
 from ...engine.parameters import parameter
 from ...engine.rims_settings import RimsSettings
@@ -59,24 +58,47 @@ def rims_settings(options: Namespace) -> RimsSettings:
     return RimsSettings(**told)
 
 
-def with_braking(runs: Sequence[Run], marks: Sequence[str] | None) -> list[Run]:
-    """The runs with the braking that [RUN=]BEGIN:END or [RUN=]none marks."""
-    marked: dict[str, list[tuple[float, float]]] = {}
-    for mark in marks or ():
-        argument = f"--braking {mark}"
+def braking(marks: Iterable[str], paths: Sequence[str]) -> dict[int, tuple[Interval, ...]]:
+    """Braking by a run's place in `paths`, out of [RUN=]BEGIN:END and [RUN=]none.
+
+    RUN is a recording's path as it was given, or the file's name where only one has it.
+    """
+    marked: dict[int, list[str]] = {}
+    for mark in marks:
         name, _, text = mark.rpartition("=")
-        if not name and len(runs) > 1:
-            raise ArgumentError(f"{argument} names no run of several; write RUN={mark}.")
-        name = Path(name).name or runs[0].name
-        if name not in (run.name for run in runs):
-            known = ", ".join(run.name for run in runs)
-            raise ArgumentError(f"{argument}: there is no run {name}; there are {known}.")
-        intervals = marked.setdefault(name, [])
-        if text != "none":
-            intervals.append(_two_numbers(text, argument, INTERVAL))
-    return [
-        replace(run, braking=tuple(marked[run.name])) if run.name in marked else run for run in runs
-    ]
+        marked.setdefault(_place(name, paths, mark), []).append(text)
+    return {place: _intervals(texts, paths[place]) for place, texts in marked.items()}
+
+
+def _place(name: str, paths: Sequence[str], mark: str) -> int:
+    """Where in `paths` the run is that a mark of braking names."""
+    known = ", ".join(paths)
+    if not name:
+        if len(paths) > 1:
+            raise ArgumentError(f"--braking {mark} names no run of several; write RUN={mark}.")
+        return 0
+    if name in paths:
+        return paths.index(name)
+    called = [place for place, path in enumerate(paths) if Path(path).name == name]
+    if not called:
+        raise ArgumentError(f"--braking {mark}: there is no run {name}; there are {known}.")
+    if len(called) > 1:
+        raise ArgumentError(
+            f"--braking {mark}: several runs are called {name}; name it by its path, one of"
+            f" {known}."
+        )
+    return called[0]
+
+
+def _intervals(texts: Sequence[str], path: str) -> tuple[Interval, ...]:
+    """All that is marked in one run."""
+    if "none" not in texts:
+        return tuple(_two_numbers(text, f"--braking {path}={text}", INTERVAL) for text in texts)
+    if set(texts) != {"none"}:
+        raise ArgumentError(
+            f"--braking marks {path} with none and with an interval; leave out one of them."
+        )
+    return ()
 
 
 def _assigned(assignment: str, argument: str, form: str, earlier: Iterable[str]) -> tuple[str, str]:

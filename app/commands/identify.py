@@ -8,10 +8,9 @@ from argparse import Namespace
 from ...engine.fit import Fit, Progress
 from ...engine.fit_file import fit_to_json
 from ...engine.identification import identify as fit_to_runs
-from ...engine.measurement import read_run
 from ...engine.problem import Problem
-from .arguments import bounds, rims_settings, starts, with_braking
-from .inputs import find_vehicle, read_noise
+from .arguments import bounds, rims_settings, starts
+from .inputs import find_vehicle, read_noise, read_runs
 from .output import (
     print_fit_percent,
     print_table,
@@ -28,7 +27,7 @@ def identify(options: Namespace) -> None:
     noise = read_noise(options.noise)
     problem = Problem.build(
         find_vehicle(options.vehicle),
-        with_braking([read_run(path, noise=noise) for path in options.runs], options.braking),
+        read_runs(options.runs, options.braking or (), noise=noise),
         options.free or None,
         options.fixed or None,
         bounds=bounds(options.bounds),

@@ -1,15 +1,19 @@
 """What the commands' arguments name: a vehicle, a manoeuvre, a file of noise."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TypeVar
 
+from ...engine.channels import Run
 from ...engine.errors import ManoeuvreError, MeasurementError, RideError, VehicleError
 from ...engine.manoeuvre import Manoeuvre, read_manoeuvre, reference_manoeuvres
+from ...engine.measurement import read_run
 from ...engine.run_notes import read_notes
 from ...engine.vehicle import Vehicle
 from ...engine.vehicle_file import read_vehicle, reference_vehicles
+from .arguments import braking
 
 Known = TypeVar("Known")
 
@@ -39,6 +43,18 @@ def _known(name: str, known: Mapping[str, Known], kind: type[RideError], noun: s
     near = get_close_matches(name, known, n=1)
     hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}."
     raise kind(f"{name}: there is no such file, nor a {noun} of that name; {hint}")
+
+
+def read_runs(
+    paths: Sequence[str], marks: Iterable[str], *, noise: Mapping[str, float] | None = None
+) -> list[Run]:
+    """The recordings, with their braking where a mark tells it; `noise` as of `read_run`."""
+    marked = braking(marks, paths)
+    runs = [read_run(path, noise=noise) for path in paths]
+    return [
+        replace(run, braking=marked[place]) if place in marked else run
+        for place, run in enumerate(runs)
+    ]
 
 
 def read_noise(path: str | None) -> Mapping[str, float]:

@@ -15,8 +15,8 @@ from ...engine.simulation import (
     simulate_rims,
     simulate_road,
 )
-from .arguments import rims_settings, with_braking
-from .inputs import find_manoeuvre, find_vehicle
+from .arguments import rims_settings
+from .inputs import find_manoeuvre, find_vehicle, read_runs
 from .output import print_fit_percent, print_warnings, require_place, write_file
 
 BELONGS_TO = {
@@ -73,7 +73,7 @@ def _road(options: Namespace) -> Simulation:
 
 
 def _rims(options: Namespace) -> Simulation:
-    [run] = with_braking([read_run(options.rims)], options.braking)
+    [run] = read_runs([options.rims], options.braking or ())
     return simulate_rims(
         find_vehicle(options.vehicle),
         run,

@@ -123,7 +123,10 @@ def test_bad_command_is_refused_in_one_line_that_names_the_place(folder, capsys,
         ("--braking 2:x", "'x' is not a finite number; write BEGIN:END in seconds, or none"),
         ("--braking 3:2", "begin first"),
         ("--braking 8:9", "it lasts from 0 to 4 s"),
-        ("--braking lap.csv=1:2", "there is no run lap.csv; there are driven.csv"),
+        ("--braking -3:-1", "from -3 to -1 s, but it lasts from 0 to 4 s"),
+        ("--braking lap.csv=1:2", "there is no run lap.csv; there are"),
+        ("--braking other/driven.csv=1:2", "there is no run other/driven.csv; there are"),
+        ("--braking 1:2 none", "driven.csv with none and with an interval; leave out one"),
     ],
 )
 def test_bad_option_is_refused(driven, capsys, option, told):
@@ -281,6 +284,23 @@ def test_how_a_recording_is_prepared_is_the_caller_s_and_is_kept(folder, driven)
     settings |= {"initial_state": "measured", "step": 0.004}
     assert fit["settings"] == settings
     assert [run["braking"] for run in fit["runs"]] == [[], [[2.5, 3.0], [1.0, 2.0]]]
+
+
+def test_a_path_names_the_run_where_the_file_s_name_names_two(folder, driven, capsys):
+    """Marks may begin before the record, which cuts them."""
+    run = read_run(driven)
+    paths = []
+    for name in ("first", "second"):
+        (folder / name).mkdir()
+        channels = {name: 1.1 ** len(paths) * run[name] for name in RECORDED}
+        paths.append(f"{name}/lap.csv")
+        write_run(Run("lap", run.time, channels), paths[-1])
+    command = ["identify", *paths, "--vehicle", "paper", "--free", "K_F", "-o", "fit.json"]
+    ambiguous = refused(capsys, *command, "--braking", "lap.csv=1:2")
+    assert "name it by its path, one of first/lap.csv, second/lap.csv" in ambiguous
+    assert main([*command, "--braking", f"{paths[1]}=-1:2", f"{paths[0]}=none"]) == 0
+    fit = json.loads((folder / "fit.json").read_text())
+    assert [run["braking"] for run in fit["runs"]] == [[], [[0.0, 2.0]]]
 
 
 def test_a_channel_with_the_wrong_sign_ends_in_a_warning_that_names_it(folder, driven, capsys):

@@ -63,6 +63,17 @@ def test_marked_braking_goes_before_what_a_x_shows():
         prepare(run, CAR)
 
 
+def test_marks_that_reach_beyond_the_record_are_cut_to_it():
+    """Oracle: within the record the weight is that of the mark as it was given."""
+    time = np.linspace(2.0, 10.0, 1601)
+    run = replace(still_run(time), braking=((-3.0, 4.0), (9.0, 99.0)))
+    prepared = prepare(run, BRAKED)
+    assert prepared.braking == ((2.0, 4.0), (9.0, 10.0))
+    begin = prepared.node_time[:-1]
+    expected = braking_weight(begin, [(-3.0, 4.0), (9.0, 99.0)])
+    assert_allclose(prepared.stage_inputs[:, 0, 14], expected, rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("interval", "sentence"),
     [((8.0, 7.0), "give the begin first"), ((12.0, 14.0), "it lasts from 0 to 10 s")],
