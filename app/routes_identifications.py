@@ -22,8 +22,17 @@ router = APIRouter(
 )
 
 
+ASKED = ("fixed", "bounds", "start", "noise", "traction", "settings", "braking")
+"""Fields of a request that its job shows as they were."""
+
+
 def job_to_json(job: Job, *, with_result: bool = False) -> dict[str, Any]:
-    """A job as the REST interface shows it."""
+    """A job as the REST interface shows it: its state, and what was asked as the request names it.
+
+    free : the parameters that the request freed, one by one
+    vehicle, result : only with the result
+    """
+    spec = job.spec
     shown = {
         "id": job.id,
         "kind": job.kind,
@@ -31,13 +40,15 @@ def job_to_json(job: Job, *, with_result: bool = False) -> dict[str, Any]:
         "created": _instant(job.created),
         "started": _instant(job.started),
         "finished": _instant(job.finished),
-        "runs": [{"id": run["id"], "name": run["name"]} for run in job.spec["runs"]],
-        "free": job.spec["names"],
-        "traction": job.spec["traction"],
+        "runs": [{"id": run["id"], "name": run["name"]} for run in spec["runs"]],
+        "free": spec["names"],
+        **{name: spec[name] for name in ASKED},
         "progress": job.progress,
         "error": job.error,
     }
-    return clean({**shown, "result": job.result} if with_result else shown)
+    if with_result:
+        shown |= {"vehicle": spec["vehicle"], "result": job.result}
+    return clean(shown)
 
 
 def _instant(seconds: float | None) -> str | None:

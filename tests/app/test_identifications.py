@@ -8,13 +8,16 @@ import time
 import httpx2
 import psutil
 import pytest
+from ridetune.app.schemas import IdentificationRequest
 from ridetune.app.settings import Settings
+from ridetune.engine.parameters import PARAMETER_NAMES
 from ridetune.engine.vehicle_file import read_vehicle, vehicle_to_json
 
 from .conftest import SAMPLES, Visitor, open_client
 from .live import LiveService
 
 PATIENCE = 120.0
+REAR = "rear.suspension.stiffness"
 
 
 @pytest.fixture(scope="module")
@@ -80,6 +83,37 @@ def test_marked_braking_and_settings_are_used_and_kept(engineer):
     assert result["settings"]["rim_cutoff_hz"] == 40.0
     assert result["settings"]["a_x_cutoff_hz"] == 20.0
     assert result["runs"][0]["braking"] == [[12.0, 15.0]]
+
+
+def test_what_a_job_shows_repeats_its_fit(engineer):
+    """Oracle: the first fit. The session's car has changed in between."""
+    run = engineer.get("/measurements").json()[0]["id"]
+    asked = {
+        "runs": [run],
+        "fixed": [name for name in PARAMETER_NAMES if name not in (REAR, "front.pivot.angle")],
+        "bounds": {REAR: [1e4, 9e4]},
+        "start": {REAR: 4e4},
+        "noise": {"chassis.z": 1e-3},
+        "traction": "paper",
+        "settings": {"rim_cutoff_hz": None, "initial_state": "measured", "step": 0.004},
+        "braking": {run: []},
+    }
+    first = engineer.post("/identifications", json=asked).json()["id"]
+    first = wait_for(engineer, first, "done", "failed")
+    assert engineer.get("/identifications").json()[-1].keys() == first.keys() - {
+        "vehicle",
+        "result",
+    }
+    stiffer = {**first["vehicle"], "chassis": {**first["vehicle"]["chassis"], "mass": 1500.0}}
+    assert engineer.put("/vehicle", json=stiffer).status_code == 200
+
+    again = {name: first[name] for name in IdentificationRequest.model_fields if name != "key"}
+    again["runs"] = [run["id"] for run in first["runs"]]
+    again = engineer.post("/identifications", json=again).json()["id"]
+    again = wait_for(engineer, again, "done", "failed")
+    differ = {name for name in first["result"] if first["result"][name] != again["result"][name]}
+    assert differ <= {"seconds"}
+    assert first["free"] == again["free"] == [REAR, "front.pivot.angle"]
 
 
 def test_a_start_too_stiff_for_the_step_is_refused_with_one_that_it_takes(engineer):
