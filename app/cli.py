@@ -11,6 +11,7 @@ import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -46,6 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def command_line() -> "Parser":
     """The parser of all commands; `options.run` is the chosen one."""
     parser = Parser(prog="ridetune", description="Tune the ride of a car from measurements.")
+    parser.add_argument("--version", action="version", version=f"%(prog)s {version('ridetune')}")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     parser.commands = commands.choices
 
@@ -139,6 +141,7 @@ def _describe_campaign(command: Parser) -> None:
     _add_noise(command, "noise to add")
     command.add_argument("--seed", metavar="N", type=_seed, default=0, help="of the noise")
     command.add_argument("-o", "--output", metavar="DIR", required=True, help="folder to fill")
+    command.add_argument("--force", action="store_true", help="write over files that are there")
 
 
 def _add_vehicle(command: Parser) -> None:

@@ -64,6 +64,18 @@ def make_folder(path: str | Path) -> Path:
     return path
 
 
+def refuse_to_overwrite(paths: Iterable[Path]) -> None:
+    """Refuse before the first of several files is written where one of them is already there.
+
+    A single file that is named with -o is written over: its name was chosen.
+    """
+    if there := [path for path in paths if path.exists()]:
+        raise OutputError(
+            f"{there[0]}: the file is there already; choose another folder with -o, or write over"
+            " it with --force."
+        )
+
+
 def print_table(rows: Sequence[Sequence[str]], right: Iterable[int] = ()) -> None:
     """Print rows with aligned columns; those in `right` are flush right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import urllib.request
+from importlib.metadata import version
 
 import numpy as np
 import pytest
@@ -341,6 +342,24 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_work(folder, drive
     assert place in refused.err
     assert "-o" in refused.err
     assert refused.out == ""
+
+
+def test_campaign_writes_over_nothing_unless_forced(folder, capsys):
+    (folder / "runs").mkdir()
+    (folder / "runs" / "manoeuvre_2.csv").write_text("mine")
+    message = refused(capsys, "campaign", "-o", "runs")
+    assert message.startswith("ridetune: runs/manoeuvre_2.csv: the file is there already")
+    assert [path.name for path in (folder / "runs").iterdir()] == ["manoeuvre_2.csv"]
+    assert (folder / "runs" / "manoeuvre_2.csv").read_text() == "mine"
+    assert main(["campaign", "-o", "runs", "--force"]) == 0
+    assert read_run("runs/manoeuvre_2.csv").columns == RECORDED
+
+
+def test_the_version_is_that_of_the_package(capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["--version"])
+    assert stop.value.code == 0
+    assert capsys.readouterr().out == f"ridetune {version('ridetune')}\n"
 
 
 def test_a_simulation_tells_when_a_tyre_pulls_on_the_road(folder, capsys):
