@@ -1,10 +1,13 @@
 """The shipped recordings: they read cleanly, suffice to identify a car, and can be made again."""
 
+import re
 import runpy
+import shlex
 from pathlib import Path
 
 import pytest
 from numpy.testing import assert_allclose
+from ridetune.app.cli import main
 from ridetune.engine.measurement import missing_for_identification, read_run
 from ridetune.engine.vehicle_file import read_vehicle, reference_vehicles
 
@@ -38,6 +41,20 @@ def test_readme_tells_what_every_file_is():
     text = (FOLDER / "README.md").read_text()
     for path in [*RUNS, *FOLDER.glob("*.json"), *FOLDER.glob("*.toml"), *FOLDER.glob("*.py")]:
         assert f"`{path.name}`" in text
+
+
+def test_command_in_the_readme_finds_the_car_that_drove(monkeypatch, capsys):
+    """Oracle: the car beside the runs; twice the printed half-width, four standard errors."""
+    monkeypatch.chdir(FOLDER.parent)
+    text = (FOLDER / "README.md").read_text().replace("\\\n", "")
+    (command,) = re.findall(r"^    (\.venv/bin/ridetune .*)$", text, re.MULTILINE)
+    assert main(shlex.split(command)[1:]) == 0
+    printed = capsys.readouterr().out
+    assert "The fit converged" in printed
+    truth = read_vehicle(FOLDER / "paper_vehicle.json")
+    for name in ("front.suspension.stiffness", "rear.pivot.angle"):
+        value, half_width = re.search(rf"^{name} +(\S+) +(\S+)", printed, re.MULTILINE).groups()
+        assert abs(float(value) - truth.value(name)) < 2.0 * float(half_width)
 
 
 def test_twin_can_be_made_again(tmp_path):
