@@ -7,6 +7,7 @@ import { density } from "./spectrum.js";
 import { get, on } from "./store.js";
 import { clock, onTime, seek } from "./timeline.js";
 import * as units from "./units.js";
+import { worded } from "./wording.js";
 
 const SPECTRUM = "spectrum of ";
 const GROUPS = {
@@ -67,6 +68,7 @@ export function build(changed) {
   });
   onGroup = changed;
   on("now reference measured trouble", fill);
+  on("trouble", say);
   on("compare ride", legend);
   onTime(cursor);
   new ResizeObserver(debounced(resize, 60)).observe($("#chart-area"));
@@ -76,6 +78,14 @@ export function build(changed) {
 export function showAll() {
   zoom = null;
   fill();
+}
+
+/** Why the ride could not be simulated, and what the lines are then. */
+function say({ trouble, now }) {
+  const box = $("#chart-note");
+  box.hidden = !trouble;
+  const kept = now ? [" The lines are those of the last car that could be simulated."] : [];
+  box.replaceChildren(...(trouble ? [...worded(trouble.message), ...kept] : []));
 }
 
 function legend() {

@@ -94,10 +94,7 @@ function follow() {
   });
   on("liftOff traction rimsSettings braking", () => want("now", "reference"));
   on("vehicle", () => want("now", "scene", "reference"));
-  on("ride road", () => {
-    set({ now: null, reference: null, measured: null });
-    want("measured", "now", "reference");
-  });
+  on("ride road", () => want("measured", "now", "reference"));
   on("ride", () => charts.showAll());
   on("now measured", (state) => {
     const run = state.now ?? state.measured;

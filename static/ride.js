@@ -12,7 +12,7 @@ export function build() {
   $("#ride").addEventListener("change", () => choose($("#ride").value));
   $("#road").addEventListener("change", () => {
     const { value } = $("#road");
-    set({ road: value ? JSON.parse(value) : null });
+    begin({ road: value ? JSON.parse(value) : null });
   });
   $("#compare").addEventListener("change", () => set({ compare: $("#compare").value }));
   $("#road").append(
@@ -42,8 +42,11 @@ function roadChoices(roads) {
 /** Choose by key: "measurement ID" or "manoeuvre KEY". */
 export function choose(key) {
   const [kind, id] = split(key);
-  set({ ride: kind === "measurement" ? { kind, id } : { kind, key: id }, road: null });
+  begin({ ride: kind === "measurement" ? { kind, id } : { kind, key: id }, road: null });
 }
+
+/** Another ride begins empty: what is shown is never a run of the one before. */
+const begin = (ride) => set({ ...ride, now: null, reference: null, measured: null, trouble: null });
 
 const split = (key) => [key.slice(0, key.indexOf(" ")), key.slice(key.indexOf(" ") + 1)];
 const keyOf = (ride) => `${ride.kind} ${ride.id ?? ride.key}`;

@@ -15,6 +15,8 @@ const CAMERAS = {
 };
 const PATIENCE = 12000;
 const SCALE_STEP = 2e-4;
+/** What is shown of a ride that cannot be simulated: the car at rest on flat ground. */
+const REST = { time: new Float32Array(1), values: {}, head: { mode: "rest" } };
 
 let frame = null;
 let parts = new Set();
@@ -80,7 +82,7 @@ export function build(sid, { askForCar }) {
     place();
   });
   onTime(place);
-  on("now reference measured ride compare", refresh);
+  on("now reference measured compare trouble", refresh);
   on("online", (state) => {
     if (state.online && !seen.connected) frame.contentWindow?.bridge?.retry();
   });
@@ -150,8 +152,11 @@ function refresh() {
   place();
 }
 
+/** The first of these runs that is there. */
+const shown = (...names) => names.map(get).find(Boolean) ?? (get("trouble") ? REST : null);
+
 function place() {
-  const run = get("now") ?? get("measured");
+  const run = shown("now", "measured");
   if (!seen.built || !run) return;
   const vehicle = get("vehicleNow") ?? get("vehicle");
   const messages = carMessages(vehicle, run, clock.time, clock.magnification);
@@ -183,7 +188,7 @@ function place() {
 
 /** The road is shaped once a ride: the sliders move the car, not the ground. */
 function shapeRoad() {
-  const run = get("measured") ?? get("now");
+  const run = shown("measured", "now");
   if (!run) return;
   const key = `${JSON.stringify(get("ride"))} ${JSON.stringify(get("road"))} ${run.head.mode}`;
   if (shownRoad?.key === key) return;

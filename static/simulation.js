@@ -2,12 +2,10 @@
 
 import * as api from "./api.js";
 import { allChannels, visibleChannels } from "./charts.js";
-import { $ } from "./dom.js";
 import { withValues } from "./controls.js";
 import { POSE_CHANNELS } from "./poses.js";
 import { rimsOf } from "./preparation.js";
 import { get, set } from "./store.js";
-import { worded } from "./wording.js";
 
 const MOST_SAMPLES = 2001;
 const MEASURED_SAMPLES = 4001;
@@ -70,7 +68,7 @@ async function loop() {
       if (error.lost) set({ online: false });
       else if (error.code === "compiling") set({ ready: false });
       else if (error.code === "busy") await new Promise((done) => setTimeout(done, 500));
-      else failed(error);
+      else set({ trouble: error });
     }
   }
   running = false;
@@ -98,8 +96,7 @@ async function now() {
   wanted.now = wanted.scene = false;
   const run = await retried(scene ? "scene" : "now", () => api.simulate(request({ vehicle, values, scene })));
   if (!isStill()) return;
-  failed(null);
-  set({ now: run, vehicleNow: withValues(vehicle, values) });
+  set({ trouble: null, now: run, vehicleNow: withValues(vehicle, values) });
   timing.shown.push(performance.now() - asked);
   if (timing.shown.length > 500) timing.shown.shift();
 }
@@ -136,10 +133,3 @@ async function retried(name, work) {
   }
 }
 
-function failed(error) {
-  const box = $("#chart-note");
-  box.hidden = !error;
-  const kept = get("now") ? [" The lines are those of the last car that could be simulated."] : [];
-  box.replaceChildren(...(error ? [...worded(error.message), ...kept] : []));
-  set({ trouble: error });
-}

@@ -176,6 +176,11 @@ class Visitor:
         ]
 
 
+def add_file(visitor: Visitor, name: str, data: bytes) -> None:
+    """Choose a file on the page."""
+    visitor.page.set_input_files("#file", [{"name": name, "mimeType": "text/csv", "buffer": data}])
+
+
 def changed_pixels(one: np.ndarray, other: np.ndarray) -> float:
     """Share of the pixels that differ visibly."""
     return float(np.mean(np.abs(one.astype(int) - other).max(axis=2) > 24))

@@ -3,13 +3,9 @@
 import numpy as np
 import pytest
 
-from .conftest import short_run
+from .conftest import add_file, short_run
 
 pytestmark = pytest.mark.browser
-
-
-def add_file(visitor, name, data):
-    visitor.page.set_input_files("#file", [{"name": name, "mimeType": "text/csv", "buffer": data}])
 
 
 def free_only(visitor, *symbols):

@@ -6,7 +6,7 @@ import signal
 import numpy as np
 import pytest
 
-from .conftest import Service, changed_pixels
+from .conftest import SAMPLES, Service, add_file, changed_pixels
 
 pytestmark = pytest.mark.browser
 
@@ -55,6 +55,35 @@ def test_a_slider_moves_charts_and_car(spectator):
     spectator.click("#reset-all")
     spectator.settled()
     np.testing.assert_array_equal(spectator.line("chassis.pitch"), before)
+
+
+def test_a_ride_is_never_shown_with_the_road_of_another(spectator):
+    """A recording with its wheels in m instead of mm is refused and looked at in between.
+
+    Oracle: the picture of the ride before. A road that cannot be driven leaves the car at rest.
+    """
+    spectator.expect("status of 422")
+    seek(spectator, 16.0)
+    before = spectator.picture()
+    wheels, rest = (SAMPLES / "detailed_manoeuvre_1.csv").read_bytes().split(b"\n", 1)
+    wrong = re.sub(rb"(wheel\.\w+\.z) \[mm\]", rb"\1 [m]", wheels) + b"\n" + rest
+    add_file(spectator, "in_metres.csv", wrong)
+    spectator.until("ridetune.state('measurements').length === 3")
+    spectator.page.select_option("#ride", label="in_metres.csv")
+    spectator.until("ridetune.state('trouble') !== null")
+    spectator.settled()
+    assert changed_pixels(spectator.picture(), before) > 0.1
+    spectator.page.select_option("#ride", label="detailed_manoeuvre_1.csv")
+    spectator.wait_until_drawn()
+    spectator.settled()
+    spectator.page.keyboard.press("Escape")
+    assert changed_pixels(spectator.picture(), before) < 1e-3
+
+    spectator.page.select_option("#ride", "manoeuvre 2")
+    spectator.page.select_option("#road", label="ISO 8608 class H")
+    spectator.until("ridetune.state('trouble') !== null")
+    height = spectator.look("ridetune.state('vehicle').chassis.cg_height")
+    np.testing.assert_array_equal(position(spectator, "/car/body"), [0, 0, height])
 
 
 def test_a_pivot_is_dragged_in_3d(spectator):
