@@ -24,11 +24,13 @@ router = APIRouter(prefix="/api", tags=["catalogue"], route_class=StrictRoute)
 @router.get("/parameters")
 def parameters() -> list[dict[str, Any]]:
     """The twelve parameters of an identification, their sliders and what is accepted, SI."""
-    accepted = {row.name: numbers()[row.name] for row in PARAMETERS}
-    return [
-        {**asdict(row), "lower": accepted[row.name].lower, "upper": accepted[row.name].upper}
-        for row in PARAMETERS
-    ]
+    return [{**asdict(row), **_accepted(row.name)} for row in PARAMETERS]
+
+
+def _accepted(name: str) -> dict[str, float]:
+    """What a vehicle takes: `lower` to `upper`, and at least `apart` from zero."""
+    accepted = numbers()[name]
+    return {"lower": accepted.lower, "upper": accepted.upper, "apart": accepted.apart}
 
 
 @router.get("/channels")

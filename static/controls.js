@@ -16,6 +16,8 @@ export const DETERMINED = {
   no: "not determined",
 };
 const rows = new Map();
+/** The number that was typed last, until a car with it has been simulated: {parameter, before}. */
+let entered = null;
 
 /** An interval may be unbounded: the run says nothing about the parameter. */
 export const isBounded = (interval) => Boolean(interval?.every(Number.isFinite));
@@ -69,6 +71,7 @@ export function build({ onBaseline }) {
         h("span", { className: `mark-interval ${verdict}` }, text.replace(" determined", "")))),
   );
   on("values baseline fit", show);
+  on("now trouble", judge);
   show();
 }
 
@@ -83,13 +86,18 @@ function row(parameter, side) {
     if (Number.isFinite(shown)) set({ values: { ...get("values"), [name]: shown / factor } });
   };
   const before = { value: 0 };
-  const isAccepted = (shown) => shown >= parameter.lower * factor && shown <= parameter.upper * factor;
+  const isAccepted = (shown) => shown >= parameter.lower * factor &&
+    shown <= parameter.upper * factor && Math.abs(shown) >= parameter.apart * factor;
   const typed = () => {
     if (field.value !== "" && isAccepted(Number(field.value))) change(Number(field.value));
   };
   const left = () => {
-    if (field.value !== "" && !isAccepted(Number(field.value))) refuse(parameter, field.value, before);
-    else if (get("values")[name] !== before.value) tellBeyond(parameter);
+    const typo = field.validity.badInput || (field.value !== "" && !isAccepted(Number(field.value)));
+    if (typo) refuse(parameter, before.value, unaccepted(parameter, field.value));
+    else if (get("values")[name] !== before.value) {
+      entered = { parameter, before: before.value };
+      judge();
+    }
     field.value = units.short(get("values")[name] * factor);
     before.value = get("values")[name];
   };
@@ -147,12 +155,32 @@ function row(parameter, side) {
   return parts.element;
 }
 
-/** A typed number that no car can have: the value from before the typing comes back. */
-function refuse({ name, label, lower, upper, display_factor: factor, display_unit: unit }, text, before) {
-  set({ values: { ...get("values"), [name]: before.value } });
-  const [from, to] = [lower, upper].map((x) => units.plain(x * factor));
-  notice("warning", `${label} stays ${units.plain(before.value * factor)} ${unit}`,
-    `${text} ${unit} is not accepted; give ${from} to ${to} ${unit}.`);
+/** A typed number that is not taken: the value from before the typing comes back. */
+function refuse({ name, label, display_factor: factor, display_unit: unit }, before, why) {
+  set({ values: { ...get("values"), [name]: before } });
+  rows.get(name).field.value = units.short(before * factor);
+  notice("warning", `${label} stays ${units.plain(before * factor)} ${unit}`, why);
+}
+
+/** Why a number that no car can have is not taken; what is no number at all has no text. */
+function unaccepted({ lower, upper, apart, display_factor: factor, display_unit: unit }, text) {
+  const range = (from, to) => `${units.plain(from * factor)} to ${units.plain(to * factor)} ${unit}`;
+  const said = text ? `${text} ${unit} is not accepted` : "What was typed is no number";
+  return apart ? `${said}; give ${range(apart, upper)} or ${range(lower, -apart)}.`
+    : `${said}; give ${range(lower, upper)}.`;
+}
+
+/** What the service says of the car with the number typed last: one it refuses is undone. */
+function judge() {
+  if (!entered) return;
+  const { parameter, before } = entered;
+  const [trouble, vehicle, values] = [get("trouble"), get("vehicleNow"), get("values")];
+  const refused = trouble?.values === values;
+  const simulated = vehicle && valueAt(vehicle, parameter.name) === values[parameter.name];
+  if (!refused && !simulated) return;
+  entered = null;
+  if (refused && trouble.code === "vehicle") refuse(parameter, before, trouble.message);
+  else tellBeyond(parameter);
 }
 
 /** A typed number beyond the slider is taken, since cars differ, but not without a word. */

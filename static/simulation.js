@@ -94,7 +94,8 @@ async function now() {
   const scene = wanted.scene;
   const asked = timing.asked;
   wanted.now = wanted.scene = false;
-  const run = await retried(scene ? "scene" : "now", () => api.simulate(request({ vehicle, values, scene })));
+  const run = await retried(scene ? "scene" : "now", () => api.simulate(request({ vehicle, values, scene })))
+    .catch((error) => { throw Object.assign(error, { values }); });
   if (!isStill()) return;
   set({ trouble: null, now: run, vehicleNow: withValues(vehicle, values) });
   timing.shown.push(performance.now() - asked);

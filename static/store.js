@@ -14,7 +14,7 @@
 //   liftOff      wheels may leave the road
 //   compare      "baseline", "7dof" or "none"
 //   now, reference, measured   runs (see api.js) of the ride, or null
-//   trouble      why the last simulation was refused, or null
+//   trouble      why the last simulation was refused (its `values` with which sliders), or null
 //   fit          the last finished fit (fit.json) or null: the sliders' error bars
 //   ready        the service has compiled its kernels
 //   online       the service answers

@@ -16,6 +16,8 @@ def test_the_tables_are_the_engines(client):
     assert all(row["slider_lower"] < row["slider_upper"] for row in parameters)
     assert all(row["lower"] <= row["slider_lower"] for row in parameters)
     assert all(row["slider_upper"] <= row["upper"] for row in parameters)
+    apart = {row["name"]: row["apart"] for row in parameters if row["apart"]}
+    assert apart == dict.fromkeys(("front.pivot.distance", "rear.pivot.distance"), 0.1)
     channels = client.get("/api/channels").json()
     assert [row["name"] for row in channels] == list(CHANNELS)
     pitch = next(row for row in channels if row["name"] == "chassis.pitch")

@@ -31,6 +31,38 @@ def test_a_number_no_car_can_have_is_refused_in_place(visitor):
     assert not notice.is_visible()
 
 
+@pytest.mark.parametrize(
+    ("field", "text", "said"),
+    [
+        ("front-suspension-stiffness", "50000000", "give 0.1 to 10000 N/mm"),
+        ("front-suspension-stiffness", "1e999", "What was typed is no number; give 0.1 to"),
+        ("front-pivot-distance", "0", "give 0.1 to 100 m or -100 to -0.1 m"),
+        # Every number is accepted by itself; it is the car's arm that cannot be.
+        ("front-pivot-angle", "85", "cannot carry the wheel up and down"),
+    ],
+)
+def test_enter_leaves_no_refused_number_in_its_box(visitor, field, text, said):
+    """Twice: the second refusal is told like the first. The value in force stays saved."""
+    visitor.expect("status of 422")
+    box = visitor.element(f"#value-{field}")
+    name, before = field.replace("-", "."), box.input_value()
+    value = visitor.value(name)
+    for _ in range(2):
+        box.click()
+        visitor.page.keyboard.press("Control+A")
+        visitor.page.keyboard.type(text)
+        visitor.page.keyboard.press("Enter")
+        notice = visitor.element(".notice.warning")
+        visitor.wait(notice.is_visible, "the refusal is told")
+        assert said in notice.inner_text()
+        assert box.input_value() == before
+        assert visitor.value(name) == value
+        notice.locator(".dismiss").click()
+        visitor.settled()
+    assert not visitor.element("#chart-note").is_visible()
+    visitor.wait(lambda: not visitor.look("ridetune.unsaved()"), "the value in force is saved")
+
+
 def test_a_number_beyond_the_slider_is_taken_with_a_word(visitor):
     field = visitor.element("#value-front-suspension-stiffness")
     field.fill("5000")
