@@ -11,11 +11,12 @@ import numpy as np
 from fastapi import APIRouter
 
 from ..engine.channels import CHANNELS
-from ..engine.parameters import PARAMETERS
+from ..engine.errors import ParameterError
+from ..engine.parameters import PARAMETERS, bounds_rule, default_bounds, parameter
 from ..engine.vehicle import numbers
 from ..engine.vehicle_file import reference_vehicles, vehicle_to_json
 from .errors import NotFound
-from .schemas import RimsSettingsForm, RoadPreview
+from .schemas import RimsSettingsForm, RoadPreview, StartValues
 from .strict_json import StrictRoute
 
 router = APIRouter(prefix="/api", tags=["catalogue"], route_class=StrictRoute)
@@ -24,13 +25,29 @@ router = APIRouter(prefix="/api", tags=["catalogue"], route_class=StrictRoute)
 @router.get("/parameters")
 def parameters() -> list[dict[str, Any]]:
     """The twelve parameters of an identification, their sliders and what is accepted, SI."""
-    return [{**asdict(row), **_accepted(row.name)} for row in PARAMETERS]
+    return [
+        {**asdict(row), **_accepted(row.name), "bounds_rule": bounds_rule(row.name)}
+        for row in PARAMETERS
+    ]
 
 
 def _accepted(name: str) -> dict[str, float]:
     """What a vehicle takes: `lower` to `upper`, and at least `apart` from zero."""
     accepted = numbers()[name]
     return {"lower": accepted.lower, "upper": accepted.upper, "apart": accepted.apart}
+
+
+@router.post("/parameters/bounds")
+def bounds(request: StartValues) -> dict[str, tuple[float, float] | None]:
+    """Default bounds of a fit from these start values; null where none follow from the start."""
+    return {parameter(name).name: _bounds(name, start) for name, start in request.start.items()}
+
+
+def _bounds(name: str, start: float) -> tuple[float, float] | None:
+    try:
+        return default_bounds(name, start)
+    except ParameterError:
+        return None
 
 
 @router.get("/channels")

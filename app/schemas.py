@@ -98,6 +98,12 @@ class RoadPreview(WireForm):
     points: Annotated[int, Field(ge=2, le=20_000)] = 2000
 
 
+class StartValues(WireForm):
+    """Where parameters start, SI, by name."""
+
+    start: Annotated[dict[Name, FiniteFloat], Field(max_length=50)]
+
+
 class IdentificationRequest(WireForm):
     """Find parameters of the session's car (or of another start) from measurements.
 

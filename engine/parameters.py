@@ -170,6 +170,14 @@ def default_bounds(name: str, start: float) -> tuple[float, float]:
     return max(lower, accepted.lower), min(upper, accepted.upper)
 
 
+def bounds_rule(name: str) -> str:
+    """The rule of `default_bounds` for a parameter, for a person to read."""
+    if ".pivot." in parameter(name).name:
+        return "the same for every car"
+    lower, upper = SHARE_OF_START
+    return f"{lower:g} to {upper:g} times the start"
+
+
 def _wished_bounds(row: Parameter, start: float) -> tuple[float, float]:
     if row.name.endswith("pivot.angle"):
         return ANGLE_BOUNDS

@@ -85,6 +85,9 @@ export async function readiness() {
   return { state: answer.state ?? (reply.ok ? "ready" : "compiling"), ...answer };
 }
 export const parameters = () => json("GET", "/api/parameters");
+/** Default bounds of a fit from {name: start value}; null where none follow. */
+export const defaultBounds = (start) =>
+  json("POST", "/api/parameters/bounds", { body: { start } });
 export const channels = () => json("GET", "/api/channels");
 export const vehicles = () => json("GET", "/api/vehicles");
 export const referenceVehicle = (key) => json("GET", `/api/vehicles/${encodeURIComponent(key)}`);

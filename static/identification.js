@@ -3,6 +3,7 @@
 import * as api from "./api.js";
 import { withValues } from "./controls.js";
 import { $, h, inPlace } from "./dom.js";
+import * as free from "./free.js";
 import { notice, refused } from "./notices.js";
 import { brakingOf, rimsOf } from "./preparation.js";
 import * as result from "./result.js";
@@ -12,6 +13,7 @@ import { get, on, set } from "./store.js";
 let job = null;
 let holdouts = {};
 let view = "setup";
+let starting = false;
 let unfollow = () => {};
 let hooks = {};
 
@@ -22,12 +24,14 @@ export function build(callbacks) {
   hooks = callbacks;
   $("#identify").addEventListener("click", () => {
     hooks.open();
-    if (!busy()) start();
+    start();
   });
-  on("measurements values ride", () => {
+  free.build();
+  on("measurements ride", () => {
     const panel = $("#identification");
     if (view === "setup" && !panel.hidden && !panel.contains(document.activeElement)) show();
   });
+  on("values", () => { if (view === "setup" && !$("#identification").hidden) free.askBounds(); });
   on("online", (state) => {
     if (state.online && job && !api.isFinal(job.state)) watch(job.id);
   });
@@ -56,27 +60,33 @@ export async function resume(jobs) {
   show();
 }
 
+/** Start a fit as set up; a second press while it is being sent starts no second one. */
 async function start() {
-  const { choice } = setup;
+  if (starting || busy()) return;
+  starting = true;
+  await submit();
+  starting = false;
+  show();
+}
+
+async function submit() {
   const runs = setup.runsAs("fit");
   if (!runs.length) {
     view = "setup";
-    show();
     notice("error", "No run to fit", "Set at least one measured run to “fit”.");
     return;
   }
-  const names = get("parameters").map(({ name }) => name);
+  const bounds = await free.bounds();
   const body = {
     vehicle: withValues(get("vehicle"), get("values")),
     runs: runs.map(({ id }) => id),
-    free: names.filter((name) => !choice.fixed.has(name)),
+    free: free.names(),
+    bounds,
     traction: get("traction"),
     settings: get("rimsSettings"),
     braking: brakingOf(runs.map(({ id }) => id)),
     key: crypto.randomUUID?.() ?? String(Math.random()).slice(2),
   };
-  const bounds = setup.bounds();
-  if (Object.keys(bounds).length) body.bounds = bounds;
   holdouts = Object.fromEntries(setup.runsAs("holdout").map((run) => [run.id, null]));
   try {
     job = await api.identify(body);
@@ -86,7 +96,6 @@ async function start() {
     return;
   }
   view = "fit";
-  show();
   watch(job.id);
 }
 

@@ -10,6 +10,7 @@
 //   road         null (as the manoeuvre says) or a road description
 //   traction     how a measured ride gets its traction, "exact" or "paper"
 //   rimsSettings   filters and initial state with which recordings drive the model
+//   defaultBounds   {start, bounds}: default bounds of a fit by parameter, and their start values
 //   braking      {measurement id: [[begin, end], ...]} in s, marked by hand
 //   liftOff      wheels may leave the road
 //   compare      "baseline", "7dof" or "none"

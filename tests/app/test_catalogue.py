@@ -25,6 +25,22 @@ def test_the_tables_are_the_engines(client):
     assert pitch["display_factor"] == pytest.approx(180.0 / math.pi)
 
 
+def test_default_bounds_follow_from_start_values(client):
+    """Oracle: the rule of docs/identification.md; no positive start, no stiffness to multiply."""
+    start = {"front.suspension.stiffness": 2e4, "rear.pivot.distance": -1.2, "Ktor_F": 0.0}
+    reply = client.post("/api/parameters/bounds", json={"start": start})
+    assert reply.json() == {
+        "front.suspension.stiffness": [1e3, 1.6e5],
+        "rear.pivot.distance": [-10.0, -0.1],
+        "front.stabilizer_bar.stiffness": None,
+    }
+    reply = client.post("/api/parameters/bounds", json={"start": {"front.suspension": 1.0}})
+    assert (reply.status_code, reply.json()["code"]) == (422, "parameter")
+    rules = {row["name"]: row["bounds_rule"] for row in client.get("/api/parameters").json()}
+    assert rules["front.suspension.stiffness"] == "0.05 to 8 times the start"
+    assert rules["rear.pivot.angle"] == "the same for every car"
+
+
 def test_the_settings_of_the_rims_mode_are_the_engines(client):
     settings = client.get("/api/rims-settings").json()
     assert RimsSettings(**settings) == RimsSettings()

@@ -97,9 +97,14 @@ def test_an_uploaded_file_is_identified(visitor):
 
 
 def test_an_identification_is_cancelled(visitor):
-    visitor.click("#identify")
+    visitor.page.dblclick("#identify")
     visitor.element("#cancel").press("Enter")
-    visitor.until("ridetune.job().state === 'cancelled'", 30)
+    visitor.until("ridetune.job()?.state === 'cancelled'", 30)
+    begun = visitor.page.evaluate(
+        "async (sid) => (await fetch(`/api/sessions/${sid}/identifications`)).json()",
+        visitor.look("ridetune.state('session')"),
+    )
+    assert len(begun) == 1, "two clicks are one press"
     assert visitor.page.evaluate("document.activeElement.id") == "start"
     assert visitor.element("#outcome").inner_text() == "Cancelled"
     assert visitor.element("#identify").is_enabled()

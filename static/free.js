@@ -1,0 +1,127 @@
+// Which parameters an identification is free to move, from where and between which bounds.
+
+import * as api from "./api.js";
+import { h, symbol } from "./dom.js";
+import { get, on, set } from "./store.js";
+import * as units from "./units.js";
+
+const COLUMNS = ["Free", "Parameter", "Start", "Lower", "Upper", "Unit"];
+const fixed = new Set();
+/** Typed bounds, {name: [SI or null, SI or null]}. */
+const typed = {};
+/** What brings each row up to date with sliders and bounds. */
+let rows = [];
+
+/** Keep the table's numbers in step with sliders and default bounds. */
+export function build() {
+  on("values defaultBounds", () => rows.forEach((show) => show()));
+}
+
+export function view() {
+  askBounds();
+  rows = [];
+  return h("section", {},
+    h("h3", {}, "Free parameters ", h("span", { className: "hint plain" },
+      "start at the sliders; bounds not typed follow")),
+    h("table", { className: "free" },
+      h("thead", {}, h("tr", {}, COLUMNS.map((text) =>
+        h("th", { scope: "col", className: text === "Unit" ? "unit" : "" }, text)))),
+      h("tbody", {}, get("parameters").map(freeRow))));
+}
+
+/** Names of the free parameters. */
+export const names = () =>
+  get("parameters").map(({ name }) => name).filter((name) => !fixed.has(name));
+
+/** {name: [lower, upper]} of the parameters of which a bound is typed. */
+export async function bounds() {
+  await askBounds();
+  return Object.fromEntries(get("parameters")
+    .filter(({ name }) => typed[name]?.some((bound) => bound !== null))
+    .map((parameter) => [parameter.name, boundsOf(parameter)]));
+}
+
+let asking = null;
+/** Default bounds for the sliders as they are, from the service; one question at a time. */
+export function askBounds() {
+  asking ??= (async () => {
+    while (get("defaultBounds")?.start !== get("values")) {
+      const start = get("values");
+      set({ defaultBounds: { start, bounds: await api.defaultBounds(start) } });
+    }
+  })().catch((error) => {
+    if (!error.lost) throw error;
+    set({ online: false });
+  }).finally(() => { asking = null; });
+  return asking;
+}
+
+function freeRow(parameter) {
+  const { name, display_factor: factor, display_unit: unit } = parameter;
+  const free = h("input", {
+    type: "checkbox", checked: !fixed.has(name), "aria-label": `${parameter.label} is free`,
+    on: { change: () => {
+      if (free.checked) fixed.delete(name);
+      else fixed.add(name);
+      show();
+    } },
+  });
+  const fields = ["Lower", "Upper"].map((word, side) => {
+    const field = h("input", {
+      type: "number", step: "any", "aria-label": `${word} bound of ${parameter.label}, ${unit}`,
+      on: { change: () => {
+        typed[name] ??= [null, null];
+        typed[name][side] = field.value === "" ? null : Number(field.value) / factor;
+        show({ typing: false });
+      } },
+    });
+    return field;
+  });
+  const begins = h("td");
+  const row = h("tr", {},
+    h("td", {}, free),
+    h("th", { scope: "row", title: parameter.label }, symbol(parameter.symbol), " ",
+      h("span", { className: "soft long" }, parameter.label)),
+    begins, fields.map((field) => h("td", {}, field)),
+    h("td", { className: "unit" }, unit));
+  const show = ({ typing = true } = {}) => {
+    const start = get("values")[name];
+    const both = boundsOf(parameter);
+    const usual = usualBounds(parameter);
+    fields.forEach((field, side) => {
+      const own = (typed[name]?.[side] ?? null) !== null;
+      if (!typing || field !== document.activeElement) field.value = units.short(both[side] * factor);
+      field.disabled = !free.checked;
+      field.classList.toggle("own", own);
+      field.title = own
+        ? `Typed; empty the field for the default, ${units.number(usual[side] * factor)} ${unit}`
+        : `Default, ${parameter.bounds_rule}; type a bound to hold it`;
+    });
+    const doubt = doubtOf(start, both);
+    begins.textContent = units.number(start * factor);
+    begins.className = doubt && free.checked ? "more" : "";
+    begins.title = doubt;
+    row.className = free.checked ? "" : "off";
+  };
+  rows.push(() => show());
+  show();
+  return row;
+}
+
+/** Why a search cannot begin at a start, or nothing. */
+function doubtOf(start, [lower, upper]) {
+  if (!get("defaultBounds")) return "";
+  if (Number.isNaN(lower + upper)) {
+    return "No default bounds follow from this start: type both, fix it or move the slider";
+  }
+  return start >= lower && start <= upper ? ""
+    : "The start lies outside its bounds: move the slider or a bound";
+}
+
+/** Between which values a parameter is searched, SI: as typed, else by default. */
+function boundsOf(parameter) {
+  return usualBounds(parameter).map((value, side) => typed[parameter.name]?.[side] ?? value);
+}
+
+/** Default bounds; NaN until the service has told them, and where none follow from the start. */
+const usualBounds = ({ name }) => get("defaultBounds")?.bounds[name] ?? [NaN, NaN];
