@@ -24,6 +24,10 @@ export const isBounded = (interval) => Boolean(interval?.every(Number.isFinite))
 
 export const valueAt = (vehicle, path) => path.split(".").reduce((part, key) => part[key], vehicle);
 
+/** Whether the slider of an estimate is where the fit put it. */
+export const holds = ({ name, value }) =>
+  Math.abs(get("values")[name] - value) <= 1e-6 * Math.abs(value);
+
 /** The vehicle with the given {path: value} in it. */
 export function withValues(vehicle, values) {
   const copy = structuredClone(vehicle);
@@ -263,8 +267,7 @@ function band(parts, estimate, factor, at, shown) {
   interval.className = `interval ${estimate.determined}`;
   const half = (high - low) / 2;
   const value = estimate.value * factor;
-  const holds = Math.abs(shown - value) <= 1e-6 * Math.abs(value);
-  spread.textContent = !holds ? `fit ${units.number(value, 3)}`
+  spread.textContent = !holds(estimate) ? `fit ${units.number(value, 3)}`
     : half > Math.abs(value) ? "± >100 %" : `± ${units.number(half, 2)}`;
   spread.className = `spread ${estimate.determined}`;
   spread.title =

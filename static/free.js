@@ -1,6 +1,7 @@
 // Which parameters an identification is free to move, from where and between which bounds.
 
 import * as api from "./api.js";
+import { holds } from "./controls.js";
 import { h, symbol } from "./dom.js";
 import { get, on, set } from "./store.js";
 import * as units from "./units.js";
@@ -11,34 +12,46 @@ const fixed = new Set();
 const typed = {};
 /** What brings each row up to date with sliders and bounds. */
 let rows = [];
+let note = null;
 
 /** Keep the table's numbers in step with sliders and default bounds. */
 export function build() {
-  on("values defaultBounds", () => rows.forEach((show) => show()));
+  on("values defaultBounds fit", () => { if (note) show(); });
+}
+
+function show() {
+  rows.forEach((update) => update());
+  const held = names().some(heldBounds);
+  note.textContent = held ? "start at the sliders; yellow: bounds of the applied fit"
+    : "start at the sliders; bounds not typed follow";
+  note.title = held ? "An applied value that ended at a bound keeps the bounds of its fit; following " +
+    "the start, they would let it run on with every fit. Type others, or fix the parameter." : "";
 }
 
 export function view() {
   askBounds();
   rows = [];
-  return h("section", {},
-    h("h3", {}, "Free parameters ", h("span", { className: "hint plain" },
-      "start at the sliders; bounds not typed follow")),
+  note = h("span", { className: "hint plain", id: "free-note" });
+  const section = h("section", {},
+    h("h3", {}, "Free parameters ", note),
     h("table", { className: "free" },
       h("thead", {}, h("tr", {}, COLUMNS.map((text) =>
         h("th", { scope: "col", className: text === "Unit" ? "unit" : "" }, text)))),
       h("tbody", {}, get("parameters").map(freeRow))));
+  show();
+  return section;
 }
 
 /** Names of the free parameters. */
 export const names = () =>
   get("parameters").map(({ name }) => name).filter((name) => !fixed.has(name));
 
-/** {name: [lower, upper]} of the parameters of which a bound is typed. */
+/** {name: [lower, upper]} of the parameters whose bounds are not the default. */
 export async function bounds() {
   await askBounds();
   return Object.fromEntries(get("parameters")
-    .filter(({ name }) => typed[name]?.some((bound) => bound !== null))
-    .map((parameter) => [parameter.name, boundsOf(parameter)]));
+    .filter(({ name }) => heldBounds(name) || typed[name]?.some((bound) => bound !== null))
+    .map(({ name }) => [name, boundsOf(name)]));
 }
 
 let asking = null;
@@ -72,7 +85,8 @@ function freeRow(parameter) {
       on: { change: () => {
         typed[name] ??= [null, null];
         typed[name][side] = field.value === "" ? null : Number(field.value) / factor;
-        show({ typing: false });
+        update({ typing: false });
+        show();
       } },
     });
     return field;
@@ -84,18 +98,21 @@ function freeRow(parameter) {
       h("span", { className: "soft long" }, parameter.label)),
     begins, fields.map((field) => h("td", {}, field)),
     h("td", { className: "unit" }, unit));
-  const show = ({ typing = true } = {}) => {
+  const update = ({ typing = true } = {}) => {
     const start = get("values")[name];
-    const both = boundsOf(parameter);
-    const usual = usualBounds(parameter);
+    const both = boundsOf(name);
+    const held = heldBounds(name);
+    const usual = usualBounds(name);
     fields.forEach((field, side) => {
       const own = (typed[name]?.[side] ?? null) !== null;
       if (!typing || field !== document.activeElement) field.value = units.short(both[side] * factor);
       field.disabled = !free.checked;
       field.classList.toggle("own", own);
+      field.classList.toggle("held", Boolean(held) && !own);
       field.title = own
-        ? `Typed; empty the field for the default, ${units.number(usual[side] * factor)} ${unit}`
-        : `Default, ${parameter.bounds_rule}; type a bound to hold it`;
+        ? `Typed; empty the field for ${units.number(usual[side] * factor)} ${unit}`
+        : held ? "From the applied fit, which ended at a bound; type another to search further"
+          : `Default, ${parameter.bounds_rule}; type a bound to hold it`;
     });
     const doubt = doubtOf(start, both);
     begins.textContent = units.number(start * factor);
@@ -103,8 +120,7 @@ function freeRow(parameter) {
     begins.title = doubt;
     row.className = free.checked ? "" : "off";
   };
-  rows.push(() => show());
-  show();
+  rows.push(update);
   return row;
 }
 
@@ -118,10 +134,20 @@ function doubtOf(start, [lower, upper]) {
     : "The start lies outside its bounds: move the slider or a bound";
 }
 
-/** Between which values a parameter is searched, SI: as typed, else by default. */
-function boundsOf(parameter) {
-  return usualBounds(parameter).map((value, side) => typed[parameter.name]?.[side] ?? value);
+/** Between which values a parameter is searched, SI: as typed, else as usual. */
+function boundsOf(name) {
+  return usualBounds(name).map((value, side) => typed[name]?.[side] ?? value);
 }
 
-/** Default bounds; NaN until the service has told them, and where none follow from the start. */
-const usualBounds = ({ name }) => get("defaultBounds")?.bounds[name] ?? [NaN, NaN];
+/** Bounds where none is typed; NaN until the service has told them, and where none follow. */
+const usualBounds = (name) =>
+  heldBounds(name) ?? get("defaultBounds")?.bounds[name] ?? [NaN, NaN];
+
+/**
+ * The bounds of the applied fit, for a parameter that ended at one of them and was not moved since.
+ * Defaults would follow it eightfold beyond, fit after fit, wherever the runs do not hold it.
+ */
+function heldBounds(name) {
+  const estimate = get("fit")?.parameters.find((found) => found.name === name);
+  return estimate?.at_bound && holds(estimate) ? [estimate.lower, estimate.upper] : null;
+}

@@ -68,6 +68,20 @@ def test_a_newcomer_identifies_the_sample_car_and_applies_it(visitor):
     assert spread.inner_text().startswith("±")
     assert visitor.value("front.suspension.stiffness") == identified
 
+    visitor.click("#identification >> text=Set-up")
+    # What ended at a bound starts the next fit between the same bounds; the others follow.
+    visitor.until("ridetune.state('defaultBounds').start === ridetune.state('values')")
+    for name, expected in (
+        ("Front stabilizer bar stiffness", [13.09, 2094.4]),
+        ("Front spring stiffness", [0.05e-3 * identified, 8e-3 * identified]),
+    ):
+        fields = (
+            visitor.page.get_by_label(f"{word} bound of {name}") for word in ("Lower", "Upper")
+        )
+        shown = [float(field.input_value()) for field in fields]
+        assert shown == pytest.approx(expected, rel=1e-4)
+    assert "yellow: bounds of the applied fit" in visitor.element("#free-note").inner_text()
+
     # What was found is still there when the page is opened again.
     visitor.wait(lambda: not visitor.look("ridetune.unsaved()"), "the sliders are saved")
     visitor.page.reload()
