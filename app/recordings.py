@@ -13,6 +13,7 @@ import numpy as np
 
 from ..engine.channels import Run, channel
 from ..engine.errors import MeasurementError
+from ..engine.run_notes import doubtful_noise
 from .store import Measurement, Store
 
 REMEMBERED_VALUES = 8_000_000
@@ -36,7 +37,12 @@ class Recordings:
         if run is None:
             run = parse(self._store.original(measurement).read_bytes(), measurement.name)
             self._remember(measurement.sha256, run)
-        return replace(run, name=measurement.name, noise={**run.noise, **measurement.noise})
+        return replace(
+            run,
+            name=measurement.name,
+            noise=measurement.noise,
+            warnings=(*run.warnings, *doubtful_noise(measurement.noise, run.channels)),
+        )
 
     def _remember(self, sha256: str, run: Run) -> None:
         with self._lock:
@@ -47,12 +53,15 @@ class Recordings:
                 self._runs.popitem(last=False)
 
 
-def parse(data: bytes, name: str) -> Run:
-    """Read a measurement file; MeasurementError says what is wrong with it and where."""
+def parse(data: bytes, name: str, noise: Mapping[str, float] | None = None) -> Run:
+    """Read a measurement file; MeasurementError says what is wrong with it and where.
+
+    noise : standard deviations in SI by channel, which are stated beside the file
+    """
     from ..engine.measurement import parse_run
 
     try:
-        return parse_run(data, name)
+        return parse_run(data, name, noise=noise)
     except (RecursionError, MemoryError, OverflowError) as error:
         raise MeasurementError(
             f"{name}: the file is too large or too deep to read ({type(error).__name__}); "

@@ -13,6 +13,7 @@ from fastapi import APIRouter
 from ..engine.channels import CHANNELS
 from ..engine.errors import ParameterError
 from ..engine.parameters import PARAMETERS, bounds_rule, default_bounds, parameter
+from ..engine.run_notes import DEFAULT_NOISE
 from ..engine.vehicle import numbers
 from ..engine.vehicle_file import reference_vehicles, vehicle_to_json
 from .errors import NotFound
@@ -52,9 +53,12 @@ def _bounds(name: str, start: float) -> tuple[float, float] | None:
 
 @router.get("/channels")
 def channels() -> list[dict[str, Any]]:
-    """Every channel: name, SI unit, and how a page shows it."""
+    """Every channel: name, SI unit, how a page shows it, and noise where none is stated, SI."""
     shown = ("name", "label", "quantity", "unit", "display_unit", "display_factor", "sign")
-    return [{key: getattr(info, key) for key in shown} for info in CHANNELS.values()]
+    return [
+        {**{key: getattr(info, key) for key in shown}, "default_noise": DEFAULT_NOISE.get(name)}
+        for name, info in CHANNELS.items()
+    ]
 
 
 @router.get("/rims-settings")

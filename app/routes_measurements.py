@@ -7,6 +7,9 @@ from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import FileResponse
 from starlette.concurrency import run_in_threadpool
 
+from ..engine.channels import OUTPUT_CHANNELS
+from ..engine.errors import MeasurementError
+from ..engine.run_notes import parse_notes
 from . import frames
 from .access import SessionId
 from .recordings import parse, summary
@@ -14,7 +17,7 @@ from .routes_simulations import FORMS, csv_reply, frames_reply
 from .services import Services, Shared
 from .store import Measurement, NewMeasurement
 from .strict_json import StrictRoute
-from .uploads import OPENAPI, Received, Upload
+from .uploads import Received, Upload, openapi
 
 router = APIRouter(
     prefix="/api/sessions/{sid}/measurements", tags=["measurements"], route_class=StrictRoute
@@ -35,7 +38,7 @@ def measurement_to_json(kept: Measurement) -> dict[str, Any]:
     }
 
 
-@router.post("", status_code=201, openapi_extra=OPENAPI)
+@router.post("", status_code=201, openapi_extra=openapi("text/csv"))
 async def upload(sid: SessionId, services: Shared, received: Received) -> dict[str, Any]:
     """Upload a recording: a form with the part `file`, or the bare file with ?name=."""
     async with services.parsing:
@@ -94,6 +97,29 @@ def original(sid: SessionId, mid: str, services: Shared) -> FileResponse:
         filename=kept.name,
         media_type="application/octet-stream",
     )
+
+
+@router.put("/{mid}/notes", openapi_extra=openapi("application/toml"))
+async def set_notes(
+    sid: SessionId, mid: str, services: Shared, received: Received
+) -> dict[str, Any]:
+    """Take a recording's noise from a NAME.toml, as the file beside it would state it."""
+    kept = services.store.measurement(sid, mid)
+    async with services.parsing:
+        noted = await run_in_threadpool(_note, services, sid, kept, received)
+    return measurement_to_json(noted)
+
+
+def _note(services: Services, sid: str, kept: Measurement, received: Upload) -> Measurement:
+    data = received.read(services.settings.limits.body_bytes)
+    noise = dict(parse_notes(data, received.name).noise)
+    if not noise.keys() & set(OUTPUT_CHANNELS):
+        raise MeasurementError(
+            f"{received.name} states no noise of {', '.join(OUTPUT_CHANNELS)}; write [noise] and "
+            'below it lines such as "chassis.z" = 0.0005, in SI.'
+        )
+    run = parse(services.store.original(kept).read_bytes(), kept.name, noise)
+    return services.store.set_noise(sid, kept.id, run.noise, summary(run))
 
 
 @router.delete("/{mid}", status_code=204)

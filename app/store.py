@@ -227,6 +227,22 @@ class Store:
             raise NotFound("There is no measurement with that id in this session.")
         return _measurement(row)
 
+    def set_noise(
+        self,
+        session: str,
+        measurement: str,
+        noise: Mapping[str, float],
+        summary: Mapping[str, Any],
+    ) -> Measurement:
+        """Keep the noise that is stated of a measurement, and what is found in it with that."""
+        with self.database.writing() as connection:
+            connection.execute(
+                update(measurements)
+                .where(measurements.c.session == session, measurements.c.id == measurement)
+                .values(noise=json.dumps(dict(noise)), summary=json.dumps(dict(summary)))
+            )
+        return self.measurement(session, measurement)
+
     def original(self, measurement: Measurement) -> Path:
         """Place of a measurement's original file."""
         return self.directory.original(measurement.sha256)

@@ -3,7 +3,7 @@
 import re
 from collections.abc import AsyncIterator
 from tempfile import SpooledTemporaryFile
-from typing import Annotated, BinaryIO, cast
+from typing import Annotated, Any, BinaryIO, cast
 
 from fastapi import Depends, Request
 from starlette.concurrency import run_in_threadpool
@@ -14,21 +14,13 @@ from .errors import InvalidRequest, TooLarge
 LONGEST_NAME = 100
 IN_MEMORY = 1_000_000
 
-OPENAPI = {
-    "requestBody": {
-        "required": True,
-        "content": {
-            "multipart/form-data": {
-                "schema": {
-                    "type": "object",
-                    "required": ["file"],
-                    "properties": {"file": {"type": "string", "format": "binary"}},
-                }
-            },
-            "text/csv": {"schema": {"type": "string", "format": "binary"}},
-        },
-    }
-}
+
+def openapi(media_type: str) -> dict[str, Any]:
+    """How the description of the interface shows a request with one file."""
+    file = {"type": "string", "format": "binary"}
+    form = {"type": "object", "required": ["file"], "properties": {"file": file}}
+    content = {"multipart/form-data": {"schema": form}, media_type: {"schema": file}}
+    return {"requestBody": {"required": True, "content": content}}
 
 
 class Upload:

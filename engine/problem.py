@@ -17,17 +17,11 @@ from .errors import ProblemError, VehicleError
 from .parameters import PARAMETER_NAMES, default_bounds, parameter
 from .rims import RimsInputs, filtered_outputs, prepare
 from .rims_settings import RimsSettings
+from .run_notes import DEFAULT_NOISE
 from .simulation import Traction
 from .vehicle import Vehicle
 
 Array = NDArray[np.float64]
-
-DEFAULT_NOISE = {
-    "chassis.z": 0.5e-3,
-    "chassis.pitch": math.radians(0.02),
-    "chassis.roll": math.radians(0.02),
-}
-"""Standard deviation of a channel's noise where neither the run nor the caller states one."""
 
 MOVES = 1.2
 """A channel moves when its standard deviation is more than this many times that of its noise."""

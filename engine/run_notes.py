@@ -22,6 +22,13 @@ from numpy.typing import NDArray
 from .channels import channel
 from .errors import MeasurementError
 
+DEFAULT_NOISE = {
+    "chassis.z": 0.5e-3,
+    "chassis.pitch": math.radians(0.02),
+    "chassis.roll": math.radians(0.02),
+}
+"""Standard deviation of a channel's noise where neither the run nor the caller states one, SI."""
+
 LARGEST_FILE = 1_000_000
 """Longest file of notes that is read, bytes."""
 

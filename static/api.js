@@ -115,6 +115,12 @@ export function upload(file) {
 }
 export const measurements = () => json("GET", `${base}/measurements`);
 export const deleteMeasurement = (id) => json("DELETE", `${base}/measurements/${id}`);
+/** Take a measurement's noise from a NAME.toml. */
+export function attachNotes(id, file) {
+  const form = new FormData();
+  form.append("file", file, file.name);
+  return json("PUT", `${base}/measurements/${id}/notes`, { body: form });
+}
 export const originalUrl = (id) => `${base}/measurements/${id}/original`;
 export function measurement(id, channelNames, maxSamples, decimate = "stride") {
   const query = new URLSearchParams({ max_samples: maxSamples, decimate });

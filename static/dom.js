@@ -44,6 +44,14 @@ export function symbol(text) {
   return h("span", { className: "symbol" }, greek, index ? h("sub", {}, index) : null);
 }
 
+/** A part that opens under its summary, into sight; `memory.open` outlives its being built anew. */
+export function fold(memory, summary, ...children) {
+  const part = h("details", { className: "fold", open: memory.open,
+    on: { toggle: () => { memory.open = part.open; } } }, summary, ...children);
+  summary.addEventListener("click", () => setTimeout(() => part.scrollIntoView({ block: "nearest" })));
+  return part;
+}
+
 const KEYED = "button, input, select, summary";
 const keyOf = (element) => element.id || element.getAttribute("aria-label") || element.textContent;
 

@@ -5,6 +5,7 @@ import { withValues } from "./controls.js";
 import { $, h, inPlace } from "./dom.js";
 import * as free from "./free.js";
 import { notice, refused } from "./notices.js";
+import * as noise from "./noise.js";
 import { brakingOf, rimsOf } from "./preparation.js";
 import * as result from "./result.js";
 import * as setup from "./setup.js";
@@ -82,6 +83,7 @@ async function submit() {
     runs: runs.map(({ id }) => id),
     free: free.names(),
     bounds,
+    noise: noise.typed(),
     traction: get("traction"),
     settings: get("rimsSettings"),
     braking: brakingOf(runs.map(({ id }) => id)),

@@ -1,8 +1,9 @@
-// Measured rides: add by button or by dropping files, look at them, delete them.
+// Measured rides: add by button or by dropping files, with notes on their noise; look, delete.
 
 import * as api from "./api.js";
 import { $, breakable, h, inPlace } from "./dom.js";
 import { nameOf } from "./names.js";
+import { sentence } from "./noise.js";
 import { notice } from "./notices.js";
 import { AXIS, COLOURS, fitWidth } from "./plots.js";
 import { choose } from "./ride.js";
@@ -23,7 +24,7 @@ export function build(callbacks) {
   parts.list = h("div", { className: "measurement-list scrolls" });
   parts.detail = h("div", { className: "measurement-detail scrolls" });
   parts.file = h("input", {
-    type: "file", id: "file", multiple: true, accept: ".csv,.txt,text/csv", className: "hidden-file",
+    type: "file", id: "file", multiple: true, accept: ".csv,.txt,.toml,text/csv", className: "hidden-file",
     "aria-label": "Measurement files",
     on: { change: () => { add([...parts.file.files]); parts.file.value = ""; } },
   });
@@ -59,16 +60,13 @@ export function build(callbacks) {
 
 async function add(files) {
   failures = [];
-  for (const file of files) {
+  const isNotes = ({ name }) => /\.toml$/i.test(name);
+  // Notes come after the recordings that they may belong to.
+  for (const file of [...files].sort((one, other) => isNotes(one) - isNotes(other))) {
     parts.busy = file.name;
     show();
     try {
-      const row = await api.upload(file);
-      set({ measurements: [...get("measurements"), row] });
-      selected = row.id;
-      notice("info", `${nameOf(row.id)} is in`, row.usable_for_identification
-        ? `${units.number(row.duration, 3)} s, ready for identification.`
-        : `It lacks ${row.missing.join(", ")} for identification.`);
+      await (isNotes(file) ? attach(file) : take(file));
     } catch (error) {
       failures.push({ name: file.name, error });
       if (error.lost) set({ online: false });
@@ -76,6 +74,29 @@ async function add(files) {
   }
   parts.busy = null;
   show();
+}
+
+async function take(file) {
+  const row = await api.upload(file);
+  set({ measurements: [...get("measurements"), row] });
+  selected = row.id;
+  notice("info", `${nameOf(row.id)} is in`, row.usable_for_identification
+    ? `${units.number(row.duration, 3)} s, ready for identification.`
+    : `It lacks ${row.missing.join(", ")} for identification.`);
+}
+
+/** NAME.toml states the noise of NAME.csv, of the newest where several are called so. */
+async function attach(file) {
+  const stem = (name) => name.replace(/\.\w+$/, "");
+  const row = get("measurements").findLast(({ name }) => stem(name) === stem(file.name));
+  if (!row) {
+    throw new Error(`No recording here is called ${stem(file.name)}.csv, whose noise it could ` +
+      "state; add the recording first, or with it.");
+  }
+  const noted = await api.attachNotes(row.id, file);
+  set({ measurements: get("measurements").map((one) => (one.id === row.id ? noted : one)) });
+  selected = row.id;
+  notice("info", `${file.name} belongs to ${nameOf(row.id)}`, sentence(noted));
 }
 
 function show() {
@@ -148,6 +169,7 @@ function detail(row) {
         "Delete")),
     h("div", { className: "row-tools" }, choice, facts),
     drawing,
+    h("p", { className: "hint" }, sentence(row)),
     ...(row.warnings.length
       ? [h("ul", { className: "warnings" }, row.warnings.map((text) => h("li", {}, text)))] : []),
     ...(row.usable_for_identification ? [] : [h("p", { className: "hint" },

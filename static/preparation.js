@@ -1,6 +1,6 @@
 // How recordings drive the model: traction, initial state, filters, and when each run brakes.
 
-import { h } from "./dom.js";
+import { fold, h } from "./dom.js";
 import { nameOf } from "./names.js";
 import { get, set } from "./store.js";
 
@@ -10,6 +10,7 @@ const FILTERS = [
   ["output_cutoff_hz", "z, pitch, roll", "compared channels, recorded and simulated alike"],
 ];
 const TRACTIONS = { exact: "exact", paper: "paper (biased)" };
+const memory = { open: false };
 const STATES = { equilibrium: "equilibrium", measured: "as measured" };
 
 /** What a simulation or a fit is told of one recording. */
@@ -27,9 +28,7 @@ export const brakingOf = (ids) =>
 export function view() {
   const settings = get("rimsSettings");
   const change = (changes) => set({ rimsSettings: { ...get("rimsSettings"), ...changes } });
-  return h("details", { className: "preparation", open: opened,
-    on: { toggle: (event) => { opened = event.target.open; } } },
-    h("summary", {}, "How recordings drive the model"),
+  return fold(memory, h("summary", {}, "How recordings drive the model"),
     choice("Traction", "traction", TRACTIONS, get("traction"), (traction) => set({ traction }),
       "exact: the force that gives the measured aₓ; paper: total mass times aₓ"),
     choice("Initial state", "initial-state", STATES, settings.initial_state,
@@ -51,8 +50,6 @@ export function view() {
         return h("tr", {}, h("th", { scope: "row", title: what }, name), h("td", {}, field));
       }))));
 }
-
-let opened = false;
 
 function choice(label, id, options, chosen, change, title) {
   const element = h("select", { id, title, on: { change: () => change(element.value) } },

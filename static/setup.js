@@ -3,6 +3,7 @@
 import { breakable, h } from "./dom.js";
 import * as free from "./free.js";
 import { nameOf } from "./names.js";
+import * as noise from "./noise.js";
 import * as preparation from "./preparation.js";
 import { get } from "./store.js";
 
@@ -31,9 +32,10 @@ export function view() {
         ? h("ul", { className: "runs" }, runs.map(runRow))
         : h("p", { className: "empty" }, "No measurement yet; add one under Measurements."),
       h("p", { className: "hint" },
-        "Unless you choose, the ride on show is fitted. A run held out is not: it shows how well " +
-        "the car predicts what it has not seen."),
-      preparation.view()),
+        "Unless you choose, the ride on show is fitted. A run held out shows how well the car " +
+        "predicts what it has not seen."),
+      preparation.view(),
+      noise.view(runsAs("fit"))),
     free.view());
 }
 
@@ -43,7 +45,7 @@ function runRow(run) {
     h("span", { className: "run-name", title: nameOf(run.id) }, breakable(nameOf(run.id))),
     run.usable_for_identification
       ? h("span", { className: "run-use" },
-          select(ROLES, role, (value) => { roles[run.id] = value; },
+          select(ROLES, role, (value) => { roles[run.id] = value; noise.show(runsAs("fit")); },
             { "aria-label": `Use of ${nameOf(run.id)}` }),
           h("label", {}, "brakes", preparation.brakingField(run)))
       : h("span", { className: "badge", title: `It lacks ${run.missing.join(", ")}.` },

@@ -7,6 +7,7 @@ from ridetune.engine.channels import CHANNELS
 from ridetune.engine.manoeuvre import manoeuvre_from_json, reference_manoeuvres
 from ridetune.engine.parameters import PARAMETER_NAMES
 from ridetune.engine.rims_settings import RimsSettings
+from ridetune.engine.run_notes import DEFAULT_NOISE
 from ridetune.engine.vehicle_file import reference_vehicles, vehicle_from_json
 
 
@@ -23,6 +24,8 @@ def test_the_tables_are_the_engines(client):
     pitch = next(row for row in channels if row["name"] == "chassis.pitch")
     assert (pitch["unit"], pitch["display_unit"]) == ("rad", "deg")
     assert pitch["display_factor"] == pytest.approx(180.0 / math.pi)
+    noise = {row["name"]: row["default_noise"] for row in channels if row["default_noise"]}
+    assert noise == DEFAULT_NOISE
 
 
 def test_default_bounds_follow_from_start_values(client):

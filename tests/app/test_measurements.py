@@ -77,6 +77,41 @@ def test_a_deleted_measurement_is_gone_and_its_file_with_the_last_one(visitor, s
     assert not original.exists()
 
 
+def test_notes_state_the_noise_of_a_recording(visitor):
+    """As in a file beside it, unit doubts included; the recording stays what it is."""
+    kept = visitor.upload(short_recording(), "lap.csv").json()
+    path = f"/measurements/{kept['id']}/notes?name=lap.toml"
+    noted = visitor.put(path, content=b'[noise]\n"chassis.z" = 0.001\n')
+    assert noted.status_code == 200
+    assert noted.json() == kept | {"noise": {"chassis.z": 0.001}}
+    assert visitor.get(f"/measurements/{kept['id']}").json() == noted.json()
+    doubtful = visitor.put(path, content=b'[noise]\n"chassis.z" = 0.5\n').json()
+    assert doubtful["noise"] == {"chassis.z": 0.5}
+    assert "is this one in mm?" in doubtful["warnings"][0]
+    simulation = {"rims": {"measurement": kept["id"]}, "max_samples": 2}
+    head = visitor.post("/simulations", json=simulation).json()
+    assert doubtful["warnings"][0] in head["warnings"]
+
+
+@pytest.mark.parametrize(
+    ("notes", "said"),
+    [
+        (b"[noise]\n", "lap.toml states no noise of chassis.z, chassis.pitch, chassis.roll"),
+        (b'[noise]\n"wheel.fl.z" = 1e-3\n', "lap.toml states no noise of chassis.z"),
+        (b'[noise]\n"chassis.z" = -1\n', "give a positive number in m"),
+        (b"time [s],chassis.z [mm]\n0,1\n", "lap.toml: not valid TOML"),
+    ],
+)
+def test_notes_that_say_nothing_usable_are_refused(visitor, notes, said):
+    kept = visitor.upload(short_recording(), "lap.csv").json()
+    path = f"/measurements/{kept['id']}/notes?name=lap.toml"
+    reply = visitor.put(path, content=notes)
+    assert (reply.status_code, reply.json()["code"]) == (422, "measurement")
+    assert said in reply.json()["detail"]
+    assert visitor.get(f"/measurements/{kept['id']}").json() == kept
+    assert visitor.put("/measurements/none/notes", content=notes).status_code == 404
+
+
 BAD_FILES = {
     "empty": (b"", "empty"),
     "binary": (bytes(range(256)) * 40, "text"),

@@ -1,9 +1,11 @@
 """How recordings drive the model, chosen on the page."""
 
+from math import radians
+
 import numpy as np
 import pytest
 
-from .conftest import Visitor
+from .conftest import Visitor, add_file
 from .test_identification import free_only
 
 pytestmark = pytest.mark.browser
@@ -19,7 +21,7 @@ def change(visitor: Visitor, label: str, text: str) -> None:
 def test_filters_and_initial_state_act_on_the_ride_and_on_the_fit(visitor):
     """Oracle: the line moves with each choice and comes back with it; the fit keeps them."""
     visitor.click("#tab-identification")
-    visitor.click(".preparation summary")
+    visitor.click("text=How recordings drive the model")
     before = visitor.line("chassis.pitch")
     change(visitor, "Low-pass of the wheel centres", "2")
     filtered = visitor.line("chassis.pitch")
@@ -56,3 +58,50 @@ def test_braking_is_marked_run_by_run(visitor):
     assert marked == [[6.2, 9.8], [12, 14]]
     change(visitor, when, "none")
     visitor.wait(lambda: not visitor.element("#chart-note").is_visible(), "it goes on")
+
+
+def test_noise_is_typed_or_stated_or_the_default(visitor):
+    """Oracle: units by hand; what is typed goes before what a NAME.toml states."""
+    noise = {name: visitor.page.get_by_label(f"Noise of {name}") for name in ("z", "pitch", "roll")}
+    summary = visitor.page.locator("summary", has_text="Noise")
+    visitor.click("#tab-identification")
+    assert summary.inner_text() == "Noise: default"
+    summary.click()
+    shown = {name: field.get_attribute("placeholder") for name, field in noise.items()}
+    assert shown == {"z": "0.5", "pitch": "0.02", "roll": "0.02"}
+
+    visitor.click("#tab-measurements")
+    add_file(visitor, "detailed_manoeuvre_1.toml", b"noise.chassis.z = 0.002")
+    stated = "Noise as stated: z 2 mm. By default: pitch 0.02 deg, roll 0.02 deg."
+    visitor.wait(
+        lambda: stated in visitor.element(".measurement-detail").inner_text(), "the noise is shown"
+    )
+    visitor.click("#tab-identification")
+    assert summary.inner_text() == "Noise: stated, default"
+    assert noise["z"].get_attribute("placeholder") == "2"
+
+    noise["roll"].fill("0.1")
+    noise["roll"].press("Enter")
+    noise["pitch"].fill("-3")
+    noise["pitch"].press("Enter")
+    assert noise["pitch"].input_value() == ""
+    assert "chassis pitch stays 0.02 deg" in visitor.element(".notice.warning").inner_text()
+    assert summary.inner_text() == "Noise: stated, default, typed"
+    free_only(visitor, "KF")
+    with visitor.page.expect_request("**/identifications") as sent:
+        visitor.click("#start")
+    assert sent.value.post_data_json["noise"] == {"chassis.roll": pytest.approx(radians(0.1))}
+
+
+def test_notes_without_their_recording_are_explained(visitor):
+    visitor.expect("status of 422")
+    visitor.click("#tab-measurements")
+    problem = visitor.element(".problem")
+    for name, data, said in (
+        ("lap.toml", b"noise.chassis.z = 0.002", "No recording here is called lap.csv"),
+        ("detailed_manoeuvre_2.toml", b"", "states no noise of chassis.z"),
+    ):
+        add_file(visitor, name, data)
+        visitor.wait(lambda: problem.is_visible() and name in problem.inner_text(), "it is refused")
+        assert said in problem.inner_text()
+    assert visitor.look("ridetune.state('measurements').length") == 2

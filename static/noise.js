@@ -1,0 +1,94 @@
+// The noise of the compared channels, which weighs them against each other in a fit: typed for all
+// its runs, else as a run states it, else the service's default. A standard deviation.
+
+import { fold, h } from "./dom.js";
+import { nameOf } from "./names.js";
+import { notice } from "./notices.js";
+import * as units from "./units.js";
+
+const SHORT = { "chassis.z": "z", "chassis.pitch": "pitch", "chassis.roll": "roll" };
+const CHANNELS = Object.keys(SHORT);
+/** Typed noise by channel, SI. */
+const own = {};
+const memory = { open: false };
+/** What brings the fields up to date with the runs that are fitted. */
+let rows = [];
+let summary = null;
+
+/** {channel: SI} of the noise that was typed. */
+export const typed = () => ({ ...own });
+
+export function view(runs) {
+  summary = h("summary");
+  rows = [];
+  const panel = fold(memory, summary,
+    h("table", { className: "filters noise" }, h("tbody", {}, CHANNELS.map(row))),
+    h("p", { className: "hint" }, "Standard deviations: the smaller, the more a channel counts. " +
+      "Empty: as a run states it, in a NAME.toml added beside its NAME.csv, else the default."));
+  show(runs);
+  return panel;
+}
+
+/** Bring fields and summary up to date with the runs that are fitted. */
+export function show(runs) {
+  const holding = rows.map((update) => update(runs));
+  summary.textContent = `Noise: ${[...new Set(holding)].join(", ")}`;
+}
+
+function row(name) {
+  const { display_factor: factor, display_unit: unit } = units.channel(name);
+  const source = h("td", { className: "soft" });
+  let fitted = [];
+  const field = h("input", {
+    type: "number", min: "0", step: "any",
+    "aria-label": `Noise of ${SHORT[name]}, ${unit}; empty for as stated`,
+    on: { change: () => {
+      if (field.value === "" && !field.validity.badInput) delete own[name];
+      else if (Number(field.value) > 0) own[name] = Number(field.value) / factor;
+      else refuse(name, fitted);
+      show(fitted);
+    } },
+  });
+  rows.push((runs) => {
+    fitted = runs;
+    const [word, text] = holding(name, runs);
+    field.value = name in own ? units.plain(own[name] * factor, 4) : "";
+    field.placeholder = text;
+    field.title = runs.map((run) => `${nameOf(run.id)}: ${said(name, run.noise[name])}`).join("\n");
+    source.textContent = word;
+    return word;
+  });
+  return h("tr", {}, h("th", { scope: "row" }, SHORT[name]),
+    h("td", {}, field), h("td", { className: "unit" }, unit), source);
+}
+
+/** Which noise of a channel holds, in a word, and what it is unless one is typed. */
+function holding(name, runs) {
+  const stated = [...new Set(runs.map(({ noise }) => noise[name] ?? units.channel(name).default_noise))];
+  const text = stated.length > 1 ? "by run" : inUnit(name, stated[0] ?? units.channel(name).default_noise);
+  if (name in own) return ["typed", text];
+  return [runs.some(({ noise }) => name in noise) ? "stated" : "default", text];
+}
+
+function refuse(name, runs) {
+  const { label, display_unit: unit } = units.channel(name);
+  const now = name in own ? inUnit(name, own[name]) : holding(name, runs)[1];
+  notice("warning", `The noise of ${label.toLowerCase()} stays ${now} ${unit}`,
+    "Noise is a positive number; an empty field takes what the run states, else the default.");
+}
+
+const inUnit = (name, value) => units.plain(value * units.channel(name).display_factor, 3);
+
+const said = (name, value) => value === undefined ? "not stated"
+  : `${inUnit(name, value)} ${units.channel(name).display_unit} stated`;
+
+/** What a fit takes as a recording's noise, in a sentence. */
+export function sentence({ noise }) {
+  const list = (names, value) => names.map((name) => `${SHORT[name] ?? name} ` +
+    `${inUnit(name, value(name))} ${units.channel(name).display_unit}`).join(", ");
+  const stated = Object.keys(noise);
+  const others = CHANNELS.filter((name) => !(name in noise));
+  const usual = list(others, (name) => units.channel(name).default_noise);
+  return [stated.length ? `Noise as stated: ${list(stated, (name) => noise[name])}.` : "Noise is not stated.",
+    others.length ? `By default: ${usual}.` : ""].filter(Boolean).join(" ");
+}
