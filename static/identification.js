@@ -71,7 +71,7 @@ async function start() {
 }
 
 async function submit() {
-  const runs = setup.runsAs("fit");
+  const runs = setup.fitted();
   if (!runs.length) {
     view = "setup";
     notice("error", "No run to fit", "Set at least one measured run to “fit”.");
@@ -89,7 +89,7 @@ async function submit() {
     braking: brakingOf(runs.map(({ id }) => id)),
     key: crypto.randomUUID?.() ?? String(Math.random()).slice(2),
   };
-  holdouts = Object.fromEntries(setup.runsAs("holdout").map((run) => [run.id, null]));
+  holdouts = Object.fromEntries(setup.heldOut().map((run) => [run.id, null]));
   try {
     job = await api.identify(body);
   } catch (error) {
@@ -131,9 +131,9 @@ async function finished() {
 async function scoreHoldouts() {
   const fitted = job;
   const used = new Set(fitted.runs.map(({ id }) => id));
+  const seen = get("measurements").filter(({ id }) => used.has(id));
   const ids = Object.keys(holdouts).length ? Object.keys(holdouts)
-    : get("measurements").filter((m) => m.usable_for_identification && !used.has(m.id))
-      .map((m) => m.id);
+    : setup.unseen(seen).map(({ id }) => id);
   for (const id of ids) {
     try {
       const run = await api.simulate({

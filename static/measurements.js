@@ -2,7 +2,7 @@
 
 import * as api from "./api.js";
 import { $, breakable, h, inPlace } from "./dom.js";
-import { nameOf } from "./names.js";
+import { nameOf, original } from "./names.js";
 import { sentence } from "./noise.js";
 import { notice } from "./notices.js";
 import { AXIS, COLOURS, fitWidth } from "./plots.js";
@@ -78,11 +78,35 @@ async function add(files) {
 
 async function take(file) {
   const row = await api.upload(file);
+  const twin = get("measurements").find(({ sha256 }) => sha256 === row.sha256);
+  if (twin) {
+    await api.deleteMeasurement(row.id);
+    selected = twin.id;
+    notice("info", `${file.name} is already here`,
+      `It holds the same data as ${nameOf(twin.id)}, byte for byte, and was not added again.`);
+    return;
+  }
   set({ measurements: [...get("measurements"), row] });
   selected = row.id;
-  notice("info", `${nameOf(row.id)} is in`, row.usable_for_identification
-    ? `${units.number(row.duration, 3)} s, ready for identification.`
-    : `It lacks ${row.missing.join(", ")} for identification.`);
+  const { length } = row.warnings;
+  const fit = row.usable_for_identification
+    ? `${units.number(row.duration, 3)} s, with all that an identification needs`
+    : `It lacks ${row.missing.join(", ")} for identification`;
+  notice(length || !row.usable_for_identification ? "warning" : "info", `${nameOf(row.id)} is in`,
+    length ? `${fit}; but what was found in it raises doubts.` : `${fit}.`,
+    length ? { label: `See ${warned(length)}`, run: () => showWarnings(row.id) } : null);
+}
+
+const warned = (count) => `${count} warning${count > 1 ? "s" : ""}`;
+
+/** Lead to what is doubtful about a recording. */
+function showWarnings(id) {
+  hooks.open();
+  selected = id;
+  show();
+  const list = $(".warnings", parts.detail);
+  list.scrollIntoView({ block: "nearest" });
+  list.focus({ preventScroll: true });
 }
 
 /** NAME.toml states the noise of NAME.csv, of the newest where several are called so. */
@@ -127,15 +151,23 @@ function table(rows) {
     },
     h("span", { className: "name" }, breakable(nameOf(row.id))),
     h("span", { className: "soft" }, `${units.number(row.duration, 3)} s, every ` +
-      `${units.number(1000 * row.sample_step, 3)} ms, ${channels} channels `, badges(row))));
+      `${units.number(1000 * row.sample_step, 3)} ms, ${channels} channels, ${origin(row)} `, badges(row))));
   }));
+}
+
+/** Where a recording is from; it tells those of one name apart. */
+function origin(row) {
+  const first = original(row);
+  if (first) return `the same data as ${nameOf(first.id)}`;
+  return row.sample ? "sample"
+    : `added ${new Date(row.created).toLocaleString([], { dateStyle: "short", timeStyle: "short" })}`;
 }
 
 function badges(row) {
   const out = [];
   if (row.warnings.length) {
     out.push(h("span", { className: "badge warn", title: row.warnings.join("\n") },
-      `${row.warnings.length} warning${row.warnings.length > 1 ? "s" : ""}`));
+      warned(row.warnings.length)));
   }
   if (!row.usable_for_identification) {
     out.push(h("span", { className: "badge", title: `It lacks ${row.missing.join(", ")}.` },
@@ -171,7 +203,7 @@ function detail(row) {
     drawing,
     h("p", { className: "hint" }, sentence(row)),
     ...(row.warnings.length
-      ? [h("ul", { className: "warnings" }, row.warnings.map((text) => h("li", {}, text)))] : []),
+      ? [h("ul", { className: "warnings", tabIndex: -1 }, row.warnings.map((text) => h("li", {}, text)))] : []),
     ...(row.usable_for_identification ? [] : [h("p", { className: "hint" },
       `It lacks ${row.missing.join(", ")}; identification needs them.`)]),
   );

@@ -8,6 +8,13 @@ export const distinct = (names) => names.map((name, k) => {
   return alike ? `${name} (${alike + 1})` : name;
 });
 
+/** The recording before this one that holds the same bytes, or nothing. */
+export function original(run) {
+  const rows = get("measurements");
+  return rows.slice(0, rows.findIndex(({ id }) => id === run.id))
+    .find(({ sha256 }) => sha256 === run.sha256);
+}
+
 /** What the page calls a recording, or null for one that is gone. */
 export function nameOf(id) {
   const rows = get("measurements");

@@ -2,7 +2,7 @@
 
 import { breakable, h } from "./dom.js";
 import * as free from "./free.js";
-import { nameOf } from "./names.js";
+import { nameOf, original } from "./names.js";
 import * as noise from "./noise.js";
 import * as preparation from "./preparation.js";
 import { get } from "./store.js";
@@ -18,10 +18,20 @@ function roleOf(run) {
   const usable = get("measurements").filter((m) => m.usable_for_identification);
   const { kind, id } = get("ride");
   const shown = usable.find((m) => kind === "measurement" && m.id === id) ?? usable[0];
-  return run === shown ? "fit" : "holdout";
+  if (run === shown) return "fit";
+  return run.sha256 === shown.sha256 || original(run) ? "no" : "holdout";
 }
 
-export const runsAs = (role) => get("measurements").filter((run) => roleOf(run) === role);
+export const fitted = () => get("measurements").filter((run) => roleOf(run) === "fit");
+
+/** Runs to score that are not fitted: what was fitted under another name is not unseen. */
+export const heldOut = () => unseen(fitted()).filter((run) => roleOf(run) === "holdout");
+
+/** Usable runs with other data than these. */
+export function unseen(seen) {
+  const data = new Set(seen.map(({ sha256 }) => sha256));
+  return get("measurements").filter((run) => run.usable_for_identification && !data.has(run.sha256));
+}
 
 export function view() {
   const runs = get("measurements");
@@ -35,7 +45,7 @@ export function view() {
         "Unless you choose, the ride on show is fitted. A run held out shows how well the car " +
         "predicts what it has not seen."),
       preparation.view(),
-      noise.view(runsAs("fit"))),
+      noise.view(fitted())),
     free.view());
 }
 
@@ -45,11 +55,17 @@ function runRow(run) {
     h("span", { className: "run-name", title: nameOf(run.id) }, breakable(nameOf(run.id))),
     run.usable_for_identification
       ? h("span", { className: "run-use" },
-          select(ROLES, role, (value) => { roles[run.id] = value; noise.show(runsAs("fit")); },
+          select(ROLES, role, (value) => { roles[run.id] = value; noise.show(fitted()); },
             { "aria-label": `Use of ${nameOf(run.id)}` }),
-          h("label", {}, "brakes", preparation.brakingField(run)))
+          h("label", {}, "brakes", preparation.brakingField(run)),
+          copied(run))
       : h("span", { className: "badge", title: `It lacks ${run.missing.join(", ")}.` },
         "not for fitting"));
+}
+
+function copied(run) {
+  const first = original(run);
+  return first ? h("span", { className: "hint" }, "the same data as ", breakable(nameOf(first.id))) : null;
 }
 
 function select(options, value, change, properties) {

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from .conftest import add_file, short_run
+from .conftest import SAMPLES, add_file, short_run
 
 pytestmark = pytest.mark.browser
 
@@ -215,6 +215,55 @@ def test_files_of_one_name_are_told_apart(visitor):
     for name, row in zip((rides[0], rides[2]), rows, strict=False):
         assert name.replace(".csv", "") in row.replace("\n", "")
         assert f"{fits[name]['chassis.z']:.1f}" in row.replace("−", "-")
+
+
+def test_the_same_data_is_kept_once_and_never_scored_as_unseen(visitor):
+    """The second copy comes by REST, which keeps what it is sent."""
+    visitor.click("#tab-measurements")
+    data = (SAMPLES / "detailed_manoeuvre_1.csv").read_bytes()
+    add_file(visitor, "monday.csv", data)
+    notice = visitor.element(".notice")
+    visitor.wait(notice.is_visible, "it is told")
+    assert "monday.csv is already here" in notice.inner_text()
+    assert "the same data as detailed_manoeuvre_1.csv" in notice.inner_text()
+    assert visitor.look("ridetune.state('measurements').length") == 2
+
+    visitor.page.evaluate(
+        """async ([sid, text]) => fetch(`/api/sessions/${sid}/measurements?name=copy.csv`,
+            { method: "POST", headers: { "Content-Type": "text/csv" }, body: text })""",
+        [visitor.look("ridetune.state('session')"), data.decode()],
+    )
+    visitor.page.reload()
+    visitor.wait_until_drawn()
+    visitor.click("#tab-identification")
+    assert "the same data as detailed_manoeuvre_1.csv" in visitor.element(".runs").inner_text()
+    use = visitor.page.get_by_label("Use of copy.csv")
+    assert use.input_value() == "no"
+    use.select_option("holdout")
+    free_only(visitor, "KF")
+    visitor.click("#start")
+    visitor.until("ridetune.state('fit') !== null", 120)
+    scored = visitor.element(".held-out").all_inner_texts()
+    assert len(scored) == 1
+    assert "detailed_manoeuvre_2" in scored[0].replace("\n", "")
+
+
+def test_an_upload_with_warnings_leads_to_them(visitor):
+    """Millimetres taken for metres: the file has all channels, and three doubts about them."""
+    visitor.click("#tab-measurements")
+    header, rest = short_run().split(b"\n", 1)
+    wrong = header.replace(b"[mm]", b"[m]", 3)
+    add_file(visitor, "doubtful.csv", wrong + b"\n" + rest)
+    notice = visitor.element(".notice.warning")
+    visitor.wait(notice.is_visible, "it is told")
+    assert "ready" not in notice.inner_text()
+    visitor.click("#tab-car")
+    notice.get_by_role("button", name="See 3 warnings").click()
+    warnings = visitor.element("#measurements .warnings")
+    assert warnings.evaluate("(list) => list === document.activeElement")
+    assert warnings.locator("li").count() == 3
+    box = warnings.bounding_box()
+    assert box["y"] + box["height"] <= 768
 
 
 def test_a_choice_keeps_focus_and_place(visitor):
