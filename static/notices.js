@@ -6,27 +6,39 @@ import { worded } from "./wording.js";
 const KEPT = { info: 6000, warning: 15000 };
 const MOST = 4;
 
-/** A message over the 3D view, newest first; errors stay until they are dismissed. */
+/** A message below the 3D view, newest first; errors stay until they are dismissed. */
 export function notice(kind, title, text = "", action = null) {
   const box = h(
     "div",
-    { className: `notice ${kind}`, role: kind === "error" ? "alert" : "status" },
-    h("strong", {}, title),
-    text ? h("p", {}, worded(text)) : null,
+    { className: `notice ${kind}`, role: kind === "error" ? "alert" : undefined },
+    h("p", {}, h("strong", {}, text ? `${title}.` : title), " ", text ? worded(text) : null),
     action
-      ? h("button", { type: "button", on: { click: () => { action.run(); box.remove(); } } },
+      ? h("button", { type: "button", on: { click: () => { box.remove(); action.run(); } } },
           action.label)
       : null,
     h("button", {
       type: "button", className: "dismiss", title: "Dismiss (Esc)", "aria-label": "Dismiss",
-      on: { click: () => box.remove() },
+      on: { click: () => dismiss(box) },
     }, "×"),
   );
+  box.addEventListener("focusin", ({ relatedTarget }) => {
+    if (relatedTarget && !$("#notices").contains(relatedTarget)) cameFrom = relatedTarget;
+  });
   const all = $("#notices");
   all.prepend(box);
   while (all.children.length > MOST) all.lastChild.remove();
   if (KEPT[kind]) leaveAfter(box, KEPT[kind]);
   return box;
+}
+
+/** Where the focus was before it went into the messages. */
+let cameFrom = null;
+
+/** Take a message away; the focus that it held goes to the next one, or back where it came from. */
+function dismiss(box) {
+  const held = box?.contains(document.activeElement);
+  box?.remove();
+  if (held) ($("#notices .dismiss") ?? cameFrom)?.focus();
 }
 
 /** Goes by itself, but not while it is pointed at or holds the focus. */
@@ -46,7 +58,7 @@ function leaveAfter(box, wait) {
 export function listenToKeys() {
   document.addEventListener("keydown", (event) => {
     if (event.key !== "Escape" || event.defaultPrevented || $("dialog[open]")) return;
-    $("#notices").firstChild?.remove();
+    dismiss($("#notices").firstChild);
   });
 }
 

@@ -75,7 +75,7 @@ def test_a_number_beyond_the_slider_is_taken_with_a_word(visitor):
 
 
 @pytest.mark.parametrize(("width", "height"), [(1366, 768), (1440, 900), (1920, 1080)])
-def test_messages_hide_no_control(visitor, width, height):
+def test_messages_hide_neither_controls_nor_the_car(visitor, width, height):
     """Oracle: the browser's own answer to what lies under the middle of each control."""
     visitor.page.set_viewport_size({"width": width, "height": height})
     for k in range(4):
@@ -93,13 +93,14 @@ def test_messages_hide_no_control(visitor, width, height):
             }).map((e) => e.outerHTML)"""
     )
     assert hidden == []
-    messages = visitor.element("#notices").bounding_box()
-    view = visitor.element("#view").bounding_box()
-    assert messages["x"] >= view["x"]
-    assert messages["y"] >= view["y"]
-    assert messages["x"] + messages["width"] <= view["x"] + view["width"]
+    messages, view, time = (
+        visitor.element(selector).bounding_box() for selector in ("#notices", "#view", "#transport")
+    )
+    assert view["height"] >= 150
+    assert view["y"] + view["height"] <= messages["y"]
+    assert messages["y"] + messages["height"] <= time["y"]
+    assert (messages["x"], messages["width"]) == (view["x"], view["width"])
     assert dismiss["x"] + dismiss["width"] <= messages["x"] + messages["width"]
-    assert messages["y"] + messages["height"] <= view["y"] + view["height"]
 
 
 def test_messages_leave_by_themselves_unless_they_are_being_read(visitor):
@@ -112,6 +113,23 @@ def test_messages_leave_by_themselves_unless_they_are_being_read(visitor):
     message.locator(".dismiss").blur()
     visitor.page.clock.run_for(60_000)
     assert not message.is_visible()
+
+
+def test_messages_are_read_and_dismissed_by_keyboard(visitor):
+    """The focus goes from message to message, then back to where it came from."""
+    for title in ("First", "Second"):
+        add_message(visitor, title)
+    keyboard = visitor.page.keyboard
+    visitor.element("#ghost").focus()
+    while not visitor.page.evaluate("document.activeElement.closest('.notice') !== null"):
+        keyboard.press("Tab")
+    came_from = visitor.element("#magnification")
+    assert "Second" in visitor.page.evaluate("document.activeElement.closest('.notice').innerText")
+    keyboard.press("Enter")
+    assert "First" in visitor.page.evaluate("document.activeElement.closest('.notice').innerText")
+    keyboard.press("Escape")
+    assert visitor.element(".notice").count() == 0
+    assert came_from.evaluate("(slider) => slider === document.activeElement")
 
 
 def test_what_a_select_shows_is_not_cut_off(visitor):
