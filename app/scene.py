@@ -5,7 +5,9 @@ names, and what a part's pose means, are therefore shared with static/poses.js:
 
     /car/body                the sprung mass, origin at its CG, axes B
     /car/wheel_fl ...        a wheel, origin at its centre
-    /car/arm_fl ...          unit length along X from the pivot to the wheel centre, scaled
+    /car/arm_fl ...          unit length along X from the wheel centre to the pivot, scaled; the
+                             page draws of it what lies within the body
+    /car/ray_fl ...          the same as a thin line, hidden until the page shows the pivots
     /car/pivot_fl ...        origin at the pivot
     /car/spring_fl ...       unit length along Z from the wheel centre to the mount, scaled
     /car/damper_fl, rod_fl   along Z, origins at the wheel centre and at the mount
@@ -48,6 +50,7 @@ MARK = (240, 240, 240)
 
 ARM_MESH = shapes.tube((0, 0, 0), (1, 0, 0), 0.028)
 SPRING_MESH = shapes.coil((0, 0, 0.1), (0, 0, 1), 0.062, 0.009)
+RAY_MESH = shapes.tube((0, 0, 0), (1, 0, 0), 0.007)
 BAR_MESH = shapes.tube((0, 0, 0), (0, 1, 0), 0.014)
 
 
@@ -102,8 +105,10 @@ def _corner(scene: SceneApi, vehicle: Vehicle, corner: Corner) -> None:
     _part(
         scene, f"/car/pivot_{corner}", shapes.tube((0, -0.07, 0), (0, 0.07, 0), 0.055), ARM, hinge
     )
-    length, turn = _towards(hub - hinge)
-    _part(scene, f"/car/arm_{corner}", ARM_MESH, ARM, hinge, turn, scale=(length, 1, 1))
+    length, turn = _towards(hinge - hub)
+    for part, mesh in (("arm", ARM_MESH), ("ray", RAY_MESH)):
+        name, visible = f"/car/{part}_{corner}", part == "arm"
+        _part(scene, name, mesh, ARM, hub, turn, scale=(length, 1, 1), visible=visible)
     _part(scene, f"/car/spring_{corner}", SPRING_MESH, SPRING, hub, scale=(1, 1, height))
     _part(
         scene,
@@ -240,6 +245,7 @@ def _part(
     *,
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
     opacity: float | None = None,
+    visible: bool = True,
 ) -> None:
     """Every mesh has the same material: a browser without a GPU compiles each kind for seconds."""
     scene.add_mesh_simple(
@@ -251,6 +257,7 @@ def _part(
         position=np.asarray(position, dtype=float),
         wxyz=turn,
         scale=scale,
+        visible=visible,
         cast_shadow=False,
         receive_shadow=False,
     )

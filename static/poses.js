@@ -7,6 +7,9 @@
 const INBOARD = 0.19;
 const BAR_SHARE = 0.25;
 const SHADOW_LIFT = 0.012;
+/** Where the body is, roughly: beyond either axle as a share of the wheelbase, and in height, m. */
+const OVERHANG = 0.33;
+const BODY_HEIGHTS = [0.05, 1.3];
 export const CORNERS = ["fl", "fr", "rl", "rr"];
 /** Channels that a pose is made of. */
 export const POSE_CHANNELS = [
@@ -55,6 +58,31 @@ function corner(vehicle, name) {
   };
 }
 
+/**
+ * How much of an arm, from the wheel on, lies within the body at rest. A pivot is the centre of a
+ * motion: where it lies underground or far off, nothing of the car is there.
+ */
+function shareInBody(vehicle, { hub, pivot }) {
+  const { front, rear, chassis } = vehicle;
+  const beyond = OVERHANG * (front.cg_distance + rear.cg_distance);
+  const room = { 0: [-rear.cg_distance - beyond, front.cg_distance + beyond],
+    2: BODY_HEIGHTS.map((height) => height - chassis.cg_height) };
+  const shares = Object.entries(room).map(([k, [low, high]]) => {
+    const way = pivot[k] - hub[k];
+    return Math.abs(way) < 1e-9 ? 1 : ((way < 0 ? low : high) - hub[k]) / way;
+  });
+  return Math.max(0, Math.min(1, ...shares));
+}
+
+/** Axles whose pivots lie where no arm is drawn: [{axle, distance, height}], m, height from the ground. */
+export const farPivots = (vehicle) => ["fl", "rl"]
+  .filter((name) => shareInBody(vehicle, corner(vehicle, name)) < 1)
+  .map((name) => {
+    const axle = name === "fl" ? "front" : "rear";
+    const { distance, angle } = vehicle[axle].pivot;
+    return { axle, distance, height: distance * Math.tan(angle) };
+  });
+
 /** The body's pose at an instant: position, quaternion (w x y z) and a map from B to the frame. */
 export function bodyPose(vehicle, run, where, magnification) {
   const z = vehicle.chassis.cg_height + magnification * or0(valueAt(run, "chassis.z", where));
@@ -80,7 +108,8 @@ export function carMessages(vehicle, run, t, magnification) {
   const messages = [...pose("/car/body", body.position, body.wxyz)];
   const onBar = {};
   for (const name of CORNERS) {
-    const { side, radius, hub, pivot, mountHeight } = corner(vehicle, name);
+    const geometry = corner(vehicle, name);
+    const { side, radius, hub, pivot, mountHeight } = geometry;
     const angle = magnification * or0(valueAt(run, `arm.${name}.angle`, where));
     const height = valueAt(run, `wheel.${name}.z`, where);
     const [c, s] = [Math.cos(angle), Math.sin(angle)];
@@ -94,21 +123,25 @@ export function carMessages(vehicle, run, t, magnification) {
     const mount = inboard(body.place([hub[0], hub[1], hub[2] + mountHeight]));
     const turn = product(body.wxyz, aboutY(angle + travelled / radius));
     const [, strut] = turnTo([0, 0, 1], inner, mount);
-    const [length, along] = turnTo([1, 0, 0], hinge, inner);
+    const [length, along] = turnTo([1, 0, 0], inner, hinge);
+    const share = shareInBody(vehicle, geometry);
     messages.push(
       ...pose(`/car/wheel_${name}`, centre, turn),
       ...pose(`/car/pivot_${name}`, hinge, body.wxyz),
-      ...pose(`/car/arm_${name}`, hinge, along),
+      ...pose(`/car/arm_${name}`, inner, along),
+      ...pose(`/car/ray_${name}`, inner, along),
       ...pose(`/car/spring_${name}`, inner, strut),
       ...pose(`/car/damper_${name}`, inner, strut),
       ...pose(`/car/rod_${name}`, mount, strut),
       update(`/car/spring_${name}`, { scale: [1, 1, distance(inner, mount)] }),
-      update(`/car/arm_${name}`, { scale: [length, 1, 1] }),
+      update(`/car/arm_${name}`, { scale: [share * length, 1, 1] }),
+      update(`/car/ray_${name}`, { scale: [length, 1, 1] }),
+      visibility(`/car/pivot_${name}`, share === 1),
     );
     if (side < 0) {
       messages.push(position(`/car/body/grip_${name === "fr" ? "front" : "rear"}`, inboard(pivot)));
     }
-    onBar[name] = inner.map((value, k) => value + BAR_SHARE * (hinge[k] - value));
+    onBar[name] = inner.map((value, k) => value + BAR_SHARE * share * (hinge[k] - value));
   }
   for (const [axle, right, left] of [["front", onBar.fr, onBar.fl], ["rear", onBar.rr, onBar.rl]]) {
     const [length, across] = turnTo([0, 1, 0], right, left);

@@ -1,11 +1,12 @@
 // The 3D view: viser in a frame of our own origin, posed through its bridge (bridge.js).
 
-import { $, h } from "./dom.js";
+import { $, capital, h } from "./dom.js";
 import { COLOURS } from "./plots.js";
-import { carMessages, ghostMessages, pivotAt, update, visibility } from "./poses.js";
+import { carMessages, farPivots, ghostMessages, pivotAt, update, visibility } from "./poses.js";
 import { surface } from "./road.js";
 import { get, on, set } from "./store.js";
 import { clock, onTime } from "./timeline.js";
+import * as units from "./units.js";
 
 const CAMERAS = {
   "three-quarter": [[3.3, -4.1, 1.45], [0, 0, 0.5]],
@@ -26,7 +27,8 @@ let shownGrips = null;
 /** The grip that is being dragged stays where the hand is. */
 let held = null;
 let waiting = 0;
-const scales = new Map();
+/** Scale or visibility of each node as it was sent last. */
+const sent = new Map();
 /** What the browser tests look at. */
 export const seen = { connected: false, connections: 0, built: false, poses: 0, last: [] };
 
@@ -50,7 +52,7 @@ export function build(sid, { askForCar }) {
       shownRoad = null;
       shownGhost = null;
       shownGrips = null;
-      scales.clear();
+      sent.clear();
       if (seen.built) {
         note("");
         refresh();
@@ -94,13 +96,14 @@ function note(text) {
   box.textContent = text;
 }
 
-/** Hand messages to viser; a scale that has not changed is not worth a render of its part. */
+/** Hand messages to viser; what has not changed in size or sight is not worth a render of its part. */
 function inject(all) {
-  const messages = all.filter(({ name, updates }) => {
-    if (!updates?.scale) return true;
-    const before = scales.get(name);
-    scales.set(name, updates.scale);
-    return !before || updates.scale.some((x, k) => Math.abs(x - before[k]) > SCALE_STEP);
+  const messages = all.filter(({ type, name, updates, visible }) => {
+    const now = updates?.scale ?? (visible === undefined ? null : [Number(visible)]);
+    if (!now) return true;
+    const before = sent.get(`${type} ${name}`);
+    sent.set(`${type} ${name}`, now);
+    return !before || now.some((x, k) => Math.abs(x - before[k]) > SCALE_STEP);
   });
   seen.last = messages;
   seen.poses += 1;
@@ -174,7 +177,7 @@ function place() {
   if (grips !== shownGrips) {
     shownGrips = grips;
     for (const name of parts) {
-      if (name.includes("/grip_")) messages.push(visibility(name, grips));
+      if (/\/(grip|ray)_/.test(name)) messages.push(visibility(name, grips));
     }
   }
   if (ghost) messages.push(...ghostMessages(vehicle, ghost, clock.time, clock.magnification));
@@ -184,6 +187,18 @@ function place() {
     messages.push(update("/road/surface", { scale }), update("/road/lines", { scale }));
   }
   inject(messages.filter(({ name }) => name !== held));
+  caption(vehicle);
+}
+
+/** Where the pivots are that lie beyond the car. */
+function caption(vehicle) {
+  const text = farPivots(vehicle).map(({ axle, distance, height }) =>
+    `${capital(axle)} pivot: ${units.fixed(Math.abs(distance), 2)} m ` +
+    `${(axle === "front") === distance > 0 ? "behind" : "ahead of"} its axle, ` +
+    `${units.fixed(Math.abs(height), 2)} m ${height < 0 ? "under" : "above"} ground; ` +
+    "its arm is drawn as far as the car.").join("\n");
+  const box = $("#view-caption");
+  if (box.textContent !== text) box.textContent = text;
 }
 
 /** The road is shaped once a ride: the sliders move the car, not the ground. */

@@ -58,7 +58,7 @@ def test_wheels_stand_on_the_ground(nodes, vehicle, corner):
 @pytest.mark.parametrize("corner", CORNERS)
 def test_arms_reach_from_the_wheel_centre_to_the_pivot(nodes, vehicle, corner):
     """docs/model.md: the pivot lies d from the contact point and d tan(phi) above the ground."""
-    hinge, hub = ends(nodes, f"/car/arm_{corner}", (1, 0, 0))
+    hub, hinge = ends(nodes, f"/car/arm_{corner}", (1, 0, 0))
     axle = vehicle.axle_at(corner)
     assert hub[2] == pytest.approx(axle.wheel.radius)
     assert abs(hinge[0] - hub[0]) == pytest.approx(abs(axle.pivot.distance))
@@ -81,16 +81,17 @@ def test_stabilizer_bars_join_the_two_arms(nodes, axle):
     assert left[1] > 0
 
 
-def test_ghosts_and_grips_are_hidden_until_the_page_shows_them(nodes):
+def test_ghosts_grips_and_rays_are_hidden_until_the_page_shows_them(nodes):
     hidden = {name for name, (_, _, options) in nodes.items() if options.get("visible") is False}
-    assert hidden == {name for name in nodes if name.startswith(("/ghost/", "/car/body/grip_"))}
+    prefixes = ("/ghost/", "/car/body/grip_", "/car/ray_")
+    assert hidden == {name for name in nodes if name.startswith(prefixes)}
 
 
 @pytest.mark.parametrize(("axle", "corner"), [("front", "fr"), ("rear", "rr")])
 def test_grips_sit_at_the_pivots(nodes, vehicle, axle, corner):
     """The grip is a child of the body, whose origin is the CG."""
     _, _, options = nodes[f"/car/body/grip_{axle}"]
-    hinge, _ = ends(nodes, f"/car/arm_{corner}", (1, 0, 0))
+    _, hinge = ends(nodes, f"/car/arm_{corner}", (1, 0, 0))
     assert_allclose(options["position"] + np.array([0, 0, vehicle.chassis.cg_height]), hinge)
 
 

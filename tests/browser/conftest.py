@@ -153,7 +153,9 @@ class Visitor:
         return frame
 
     def picture(self) -> np.ndarray:
-        """The 3D view as (height, width, 3) bytes, once it has come to rest."""
+        """The 3D view as (height, width, 3) bytes, once it has come to rest, without messages."""
+        for message in self.element(".notice .dismiss").all():
+            message.click()
         last = None
         for _ in range(40):
             self.page.wait_for_timeout(150)

@@ -44,6 +44,39 @@ def test_arms_keep_their_length_while_the_car_moves(driver):
     np.testing.assert_allclose(lengths, np.broadcast_to(lengths[0], (6, 4)), atol=2e-5)
 
 
+@pytest.mark.parametrize(
+    ("distance", "angle", "length"),
+    [
+        (1.8, 0.06, None),
+        # From a hub 0.3 m up to 0.05 m above ground: a share 0.25 / (0.3 + 3.2 tan 0.3) of the way.
+        (3.2, -0.3, 0.25 / (0.3 + 3.2 * np.tan(0.3))),
+        # Level with the hub, back to a third of a wheelbase of 2.6 m behind the rear axle.
+        (8.0, np.arctan(0.3 / 8.0), 2.6 * (1 + 0.33) / 8.0),
+    ],
+)
+def test_an_arm_is_drawn_as_far_as_the_car(visitor, distance, angle, length):
+    """Oracle: where the straight arm leaves the body's box; None: it does not."""
+    drawn, marked, told = in_module(
+        visitor,
+        "poses",
+        """const v = structuredClone(ridetune.state("vehicle"));
+        v.front.wheel.radius = 0.3;
+        v.rear.cg_distance = 2.6 - v.front.cg_distance;
+        Object.assign(v.front.pivot, { distance: a[0], angle: a[1] });
+        const rest = { time: [0], values: {} };
+        const all = m.carMessages(v, rest, 0, 1);
+        const scale = (name) => all.find((x) => x.name === name && x.updates).updates.scale[0];
+        const pivot = all.find((x) => x.name === "/car/pivot_fl" && "visible" in x);
+        return [scale("/car/arm_fl") / scale("/car/ray_fl"), pivot.visible,
+            m.farPivots(v).some(({ axle }) => axle === "front")];""",
+        distance,
+        angle,
+    )
+    assert drawn == pytest.approx(1.0 if length is None else length)
+    assert marked == (length is None)
+    assert told == (length is not None)
+
+
 def test_wheels_touch_the_magnified_road(driver):
     """The tyre gives by load over stiffness: a few mm at most around its static compression."""
     gaps = in_module(

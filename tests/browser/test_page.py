@@ -76,7 +76,6 @@ def test_a_ride_is_never_shown_with_the_road_of_another(spectator):
     spectator.page.select_option("#ride", label="detailed_manoeuvre_1.csv")
     spectator.wait_until_drawn()
     spectator.settled()
-    spectator.page.keyboard.press("Escape")
     assert changed_pixels(spectator.picture(), before) < 1e-3
 
     spectator.page.select_option("#ride", "manoeuvre 2")
