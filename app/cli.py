@@ -74,12 +74,25 @@ class Parser(argparse.ArgumentParser):
         self._negative_number_matcher = re.compile(r"-\.?\d")
 
     def refuse_unknown(self, arguments: Sequence[str]) -> None:
-        """Refuse a misspelt command or option before anything else is found missing."""
+        """Refuse a misspelt command or option before anything else is found missing.
+
+        Also what a shell makes of an unset variable, and an option whose last use would win.
+        """
+        given = set()
         for text in arguments:
-            name = text.partition("=")[0]
-            if name.startswith("--") and name not in self._option_string_actions:
+            if text == "--":
+                break
+            name, equals, value = text.partition("=")
+            if not text or (name.startswith("--") and equals and not value):
+                self.error(f"{name or 'an argument'} is empty; give it a value or leave it out")
+            action = self._option_string_actions.get(name)
+            if name.startswith("--") and action is None:
                 known = [text for text in self._option_string_actions if text.startswith("--")]
                 self.error(f"there is no option {name} ({_near(name, known)})")
+            if action is not None and action.nargs != "+":
+                if action.dest in given:
+                    self.error(f"{name} is given twice; give it once")
+                given.add(action.dest)
             if not name.startswith("-") and self.commands:
                 if name not in self.commands:
                     self.error(f"there is no command {name!r} ({_near(name, self.commands)})")
@@ -88,6 +101,8 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong in one line and stop."""
+        if message.endswith("required: RUN"):
+            message += " (a list of names takes what follows it; put the recordings first)"
         self.exit(BAD_INPUT, f"{self.prog}: {message}; see {self.prog} --help\n")
 
 

@@ -77,9 +77,9 @@ def _place(name: str, paths: Sequence[str], mark: str) -> int:
         if len(paths) > 1:
             raise ArgumentError(f"--braking {mark} names no run of several; write RUN={mark}.")
         return 0
-    if name in paths:
-        return paths.index(name)
-    called = [place for place, path in enumerate(paths) if Path(path).name == name]
+    if Path(name) in (given := [Path(path) for path in paths]):
+        return given.index(Path(name))
+    called = [place for place, path in enumerate(given) if path.name == name]
     if not called:
         raise ArgumentError(f"--braking {mark}: there is no run {name}; there are {known}.")
     if len(called) > 1:

@@ -23,7 +23,7 @@ from .output import (
 
 def identify(options: Namespace) -> None:
     """Fit the free parameters to all runs at once, print the report, write the fit."""
-    require_place(options.output)
+    require_place(options.output, options.runs)
     noise = read_noise(options.noise)
     problem = Problem.build(
         find_vehicle(options.vehicle),

@@ -37,8 +37,10 @@ def write_file(path: str | Path, text: str) -> None:
         ) from error
 
 
-def require_place(path: str | Path | None) -> None:
-    """Refuse a place that no file can be written to, before hours of work are done for it."""
+def require_place(path: str | Path | None, recordings: Iterable[str | Path] = ()) -> None:
+    """Refuse a place that no file can be written to, before hours of work are done for it, and one
+    of the recordings that the work is done from.
+    """
     if path is None:
         return
     folder = Path(path).parent
@@ -48,8 +50,14 @@ def require_place(path: str | Path | None) -> None:
         )
     if Path(path).is_dir():
         raise OutputError(f"{path}: this is a folder; name a file with -o.")
+    if Path(path).is_file() and any(Path(path).samefile(one) for one in _existing(recordings)):
+        raise OutputError(f"{path}: this is the recording itself; name another file with -o.")
     if not os.access(folder, os.W_OK):
         raise OutputError(f"{path}: {folder} does not let you write; choose another with -o.")
+
+
+def _existing(paths: Iterable[str | Path]) -> list[Path]:
+    return [path for path in map(Path, paths) if path.exists()]
 
 
 def make_folder(path: str | Path) -> Path:

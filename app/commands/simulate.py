@@ -43,7 +43,7 @@ def simulate(options: Namespace) -> None:
         raise SimulationError("--lift-off means nothing with --rims, where tyres play no part.")
     if not options.output and mode != "rims":
         raise SimulationError("Nothing says where the run goes; add -o run.csv.")
-    require_place(options.output)
+    require_place(options.output, filter(None, (options.rims, options.posts)))
     simulation = {"manoeuvre": _road, "rims": _rims, "posts": _posts}[mode](options)
     if simulation.fit_percent:
         print_fit_percent({simulation.run.name: simulation.fit_percent})

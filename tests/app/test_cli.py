@@ -73,6 +73,11 @@ def test_describing_the_commands_imports_no_engine():
         ("identfy run.csv", "did you mean identify?"),
         ("", "COMMAND"),
         ("simulate --vehicel paper", "did you mean --vehicle?"),
+        ("simulate --vehicle= --manoeuvre 1 -o r.csv", "--vehicle is empty"),
+        ("simulate --vehicle paper --rims a.csv --rims b.csv", "--rims is given twice"),
+        ("simulate --vehicle paper --manoeuvre 1 -o a.csv --output b.csv", "given twice"),
+        ("identify --vehicle paper --free K_F run.csv", "put the recordings first"),
+        ("identify --vehicle paper --free K_F -- run.csv", "run.csv: the file cannot be read"),
         ("simulate --vehicle paper", "--manoeuvre --rims --posts"),
         ("simulate --vehicle paper --manoeuvre 1", "-o"),
         ("simulate --vehicle paper --manoeuvre 1 --model 9dof -o r.csv", "'9dof'"),
@@ -299,7 +304,7 @@ def test_a_path_names_the_run_where_the_file_s_name_names_two(folder, driven, ca
     command = ["identify", *paths, "--vehicle", "paper", "--free", "K_F", "-o", "fit.json"]
     ambiguous = refused(capsys, *command, "--braking", "lap.csv=1:2")
     assert "name it by its path, one of first/lap.csv, second/lap.csv" in ambiguous
-    assert main([*command, "--braking", f"{paths[1]}=-1:2", f"{paths[0]}=none"]) == 0
+    assert main([*command, "--braking", f"{paths[1]}=-1:2", f"./{paths[0]}=none"]) == 0
     fit = json.loads((folder / "fit.json").read_text())
     assert [run["braking"] for run in fit["runs"]] == [[], [[0.0, 2.0]]]
 
@@ -332,6 +337,20 @@ def test_campaign_records_both_manoeuvres_with_the_noise_asked_for(folder, capsy
         assert error["chassis.pitch"] == 0.0
         assert (folder / "noisy" / name).read_bytes() == (folder / "again" / name).read_bytes()
     assert read_vehicle("noisy/vehicle.json") == reference_vehicles()["paper"]
+
+
+def test_what_a_shell_makes_of_an_unset_variable_is_refused(folder, capsys):
+    assert "an argument is empty" in refused(capsys, "simulate", "--vehicle", "paper", "--rims", "")
+    assert "an argument is empty" in refused(capsys, "campaign", "-o", "")
+    assert not list(folder.iterdir())
+
+
+@pytest.mark.parametrize("command", ["identify", "simulate --rims"])
+def test_a_recording_is_not_written_over(folder, driven, capsys, command):
+    (folder / "run.csv").write_bytes(driven.read_bytes())
+    command = [*command.split(), "run.csv", "--vehicle", "paper", "-o", "./run.csv"]
+    assert "this is the recording itself" in refused(capsys, *command)
+    assert (folder / "run.csv").read_bytes() == driven.read_bytes()
 
 
 @pytest.mark.parametrize("place", ["missing/fit.json", "."])
