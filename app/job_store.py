@@ -14,7 +14,7 @@ from typing import Any
 from sqlalchemy import Row, delete, func, insert, select, update
 
 from .database import Database
-from .errors import Busy, NotFound
+from .errors import Busy, InvalidRequest, NotFound
 from .settings import Limits
 from .tables import jobs, results, sessions
 
@@ -64,11 +64,9 @@ class JobStore:
         with self._database.writing() as connection:
             mine = jobs.c.session == session
             if key is not None:
-                known = connection.execute(
-                    select(jobs.c.id).where(mine, jobs.c.key == key)
-                ).scalar_one_or_none()
+                known = connection.execute(_select(mine, jobs.c.key == key)).one_or_none()
                 if known is not None:
-                    return _job(connection.execute(_select(mine, jobs.c.id == known)).one()), False
+                    return _same(_job(known), spec), False
             total = connection.execute(select(func.count()).where(mine)).scalar_one()
             unfinished = connection.execute(
                 select(func.count()).where(mine, jobs.c.state.in_(UNFINISHED))
@@ -185,6 +183,17 @@ class JobStore:
 
 def _select(*conditions: Any) -> Any:
     return select(jobs).where(*conditions)
+
+
+def _same(kept: Job, spec: Mapping[str, Any]) -> Job:
+    """The job kept under a key, which must not stand for anything else."""
+    if kept.spec != json.loads(json.dumps(dict(spec))):
+        raise InvalidRequest(
+            "The key is that of an identification that was asked for differently; give each a key"
+            " of its own.",
+            field="key",
+        )
+    return kept
 
 
 def _job(row: Row[Any], result: str | None = None) -> Job:

@@ -220,6 +220,15 @@ def test_the_same_key_submits_once(owner, clusters):
     assert len(owner.get("/identifications").json()) == 1
 
 
+def test_a_key_stands_for_one_request(owner, clusters):
+    kept = submit(owner, key="click-1")
+    runs = [run["id"] for run in kept["runs"]]
+    other = {"runs": runs, "key": "click-1", "traction": "paper"}
+    refused = owner.post("/identifications", json=other)
+    assert (refused.status_code, refused.json()["field"]) == (422, "key")
+    assert len(owner.get("/identifications").json()) == 1
+
+
 def test_a_lost_job_is_sent_again_but_not_for_ever(owner, clusters):
     job = submit(owner)["id"]
     for _ in range(3):
