@@ -7,7 +7,15 @@ the nearest one for a misspelt key, and are shared with the command line.
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, StringConstraints
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    StringConstraints,
+)
+from pydantic_core import PydanticCustomError
 
 from ..engine.rims_settings import (
     LONGEST_STEP,
@@ -24,6 +32,16 @@ Traction = Literal["exact", "paper"]
 Cutoff = Annotated[FiniteFloat, Field(ge=LOWEST_CUTOFF)] | None
 Intervals = Annotated[list[tuple[FiniteFloat, FiniteFloat]], Field(max_length=100)]
 RIMS = RimsSettings()
+
+
+def _key_or_object(value: Any) -> Any:
+    """One refusal in place of one for each member of a union."""
+    if not isinstance(value, str | Mapping):
+        raise PydanticCustomError("manoeuvre", "give a known manoeuvre's key or an object")
+    return value
+
+
+KeyOrObject = Annotated[str | JsonObject, BeforeValidator(_key_or_object)]
 
 
 class WireForm(BaseModel):
@@ -73,7 +91,7 @@ class SimulationRequest(WireForm):
 
     vehicle: JsonObject | None = None
     values: Annotated[dict[Name, FiniteFloat], Field(max_length=200)] = {}
-    manoeuvre: Name | JsonObject | None = None
+    manoeuvre: KeyOrObject | None = None
     rims: RimsRequest | None = None
     posts: PostsRequest | None = None
     road: JsonObject | None = None

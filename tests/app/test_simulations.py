@@ -138,6 +138,7 @@ def test_a_road_of_ones_own_replaces_the_manoeuvres(driver):
 REFUSED = {
     "unknown manoeuvre": ({"manoeuvre": "3"}, 404, "constant-speed-c"),
     "two modes": ({"manoeuvre": "2", "rims": {"measurement": "x"}}, 422, "leave one"),
+    "manoeuvre by number": ({"manoeuvre": 2}, 422, "manoeuvre is refused: give a known"),
     "unknown measurement": ({"rims": {"measurement": "x"}}, 404, "measurement"),
     "unknown channel": ({"channels": ["chassis.y"]}, 422, "chassis.y"),
     "unknown parameter": ({"values": {"front.suspension.stifness": 1}}, 422, "stiffness"),
