@@ -7,12 +7,18 @@ RIDETUNE_LIMIT_ followed by its name in capitals.
 
 import dataclasses
 import ipaddress
+import math
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 from .errors import StartError
+
+LIMIT = "RIDETUNE_LIMIT_"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,13 +113,22 @@ def _port(value: int | str) -> int:
 
 
 def _limits(environment: Mapping[str, str]) -> Limits:
+    known = {f"{LIMIT}{limit.name.upper()}": limit for limit in dataclasses.fields(Limits)}
     stated = {}
-    for limit in dataclasses.fields(Limits):
-        variable = f"RIDETUNE_LIMIT_{limit.name.upper()}"
-        if (text := environment.get(variable)) is None:
-            continue
-        try:
-            stated[limit.name] = type(limit.default)(text)
-        except ValueError:
-            raise StartError(f"{variable} is {text!r}; give a number.") from None
+    for variable in sorted(name for name in environment if name.startswith(LIMIT)):
+        if variable not in known:
+            near = get_close_matches(variable, known, n=1)
+            hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}."
+            raise StartError(f"There is no limit {variable}; {hint}")
+        limit, text = known[variable], environment[variable]
+        stated[limit.name] = _positive(variable, text, type(limit.default))
     return Limits(**stated)
+
+
+def _positive(variable: str, text: str, kind: Any) -> int | float:
+    """A finite number above 0 of the limit's kind."""
+    with suppress(ValueError):
+        if 0 < (number := kind(text)) < math.inf:
+            return number
+    what = "whole number" if kind is int else "number"
+    raise StartError(f"{variable} is {text!r}; give a {what} above 0.")

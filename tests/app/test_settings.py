@@ -21,11 +21,23 @@ def test_limits_are_set_one_by_one():
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("RIDETUNE_PORT", "http"), ("RIDETUNE_PORT", "70000"), ("RIDETUNE_LIMIT_SESSIONS", "many")],
+    [
+        ("RIDETUNE_PORT", "http"),
+        ("RIDETUNE_PORT", "70000"),
+        ("RIDETUNE_LIMIT_SESSIONS", "many"),
+        ("RIDETUNE_LIMIT_SESSIONS", "-1"),
+        ("RIDETUNE_LIMIT_SESSIONS", "2.5"),
+        ("RIDETUNE_LIMIT_SIMULATED_SECONDS", "nan"),
+    ],
 )
-def test_a_value_that_is_no_number_is_named(name, value):
+def test_a_value_out_of_range_is_named(name, value):
     with pytest.raises(StartError, match=value):
         Settings.from_environment(data="x", environment={name: value})
+
+
+def test_a_misspelt_limit_is_refused_with_the_nearest():
+    with pytest.raises(StartError, match="did you mean RIDETUNE_LIMIT_SESSIONS?"):
+        Settings.from_environment(data="x", environment={"RIDETUNE_LIMIT_SESIONS": "3"})
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.2", "car.example"])
