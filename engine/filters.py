@@ -15,6 +15,7 @@ at jumps. docs/identification.md has the figures.
 """
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +66,12 @@ def smoothed(time: Array, values: Array, cutoff: float | None) -> Array:
 
 def _low_pass_uniform(time: Array, values: Array, cutoff: float) -> Array:
     rate = (len(time) - 1) / (time[-1] - time[0])
-    sections = butter(ORDER, cutoff, fs=rate, output="sos")
+    sections = _sections(cutoff, float(rate))
     pad = min(len(time) - 1, math.ceil(PAD_PERIODS * rate / cutoff))
     return sosfiltfilt(sections, values, axis=0, padtype="odd", padlen=pad)
+
+
+@lru_cache(maxsize=64)
+def _sections(cutoff: float, rate: float) -> Array:
+    """The filter for a cutoff and a sampling rate, Hz; its design takes as long as its use."""
+    return np.asarray(butter(ORDER, cutoff, fs=rate, output="sos"))
