@@ -27,8 +27,11 @@ const FREQUENCIES = [0.2, 30];
 const BOTTOM_AXIS = 38;
 const BARE_AXIS = 10;
 const CLICK_PIXELS = 4;
-/** Half the least height of a chart in display units: rounding errors are no motion. */
+/** Half the least height of a chart, in display units and as a share: rounding errors are no motion. */
 const LEAST_ROOM = 5e-3;
+const LEAST_SHARE = 1e-3;
+/** Decades of a spectrum that are shown below its peak; deeper ones are rounding errors. */
+const DEPTH = 6;
 
 let group = "body";
 let charts = [];
@@ -134,7 +137,7 @@ function options(name, spectrum, labelled) {
     width: 300, height: 120, legend: { show: false }, padding: [6, 14, 0, 0],
     scales: {
       x: spectrum ? { time: false, distr: 3, range: [...FREQUENCIES] } : { time: false },
-      y: spectrum ? { distr: 3 } : { range: room },
+      y: spectrum ? { distr: 3, range: deep } : { range: room },
     },
     axes: [
       { ...AXIS, size: labelled ? BOTTOM_AXIS : BARE_AXIS, gap: 3, labelSize: 14,
@@ -167,8 +170,16 @@ function options(name, spectrum, labelled) {
 /** A little air above and below; a flat line lies in the middle. */
 function room(_, low, high) {
   if (low === null || high === null) return [-1, 1];
-  const air = Math.max((high - low) * 0.08, LEAST_ROOM);
+  const air = Math.max((high - low) * 0.08, LEAST_ROOM, LEAST_SHARE * Math.max(-low, high));
   return [low - air, high + air];
+}
+
+/** Whole decades around a spectrum. */
+function deep(_, low, high) {
+  if (!(high > 0)) return [0.1, 1];
+  const top = Math.ceil(Math.log10(high) - 1e-9);
+  const bottom = low > 0 ? Math.floor(Math.log10(low) + 1e-9) : -Infinity;
+  return [10 ** Math.max(bottom, top - DEPTH), 10 ** top];
 }
 
 /** Draw the runs on the grid of the first that is there. */

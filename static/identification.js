@@ -32,6 +32,7 @@ export function build(callbacks) {
     const panel = $("#identification");
     if (view === "setup" && !panel.hidden && !panel.contains(document.activeElement)) show();
   });
+  on("vehicle", () => { if (view === "fit") show(); });
   on("values", () => { if (view === "setup" && !$("#identification").hidden) free.askBounds(); });
   on("online", (state) => {
     if (state.online && job && !api.isFinal(job.state)) watch(job.id);

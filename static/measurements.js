@@ -251,6 +251,7 @@ async function remove(row, event) {
   }
   // The page lets go of the file first: nothing may still be asking for it when it is deleted.
   set({ measurements: get("measurements").filter(({ id }) => id !== row.id) });
+  ($(".pick [aria-pressed=true]", parts.list) ?? $("#upload")).focus();
   await looking;
   await settled();
   try {

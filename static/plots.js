@@ -13,6 +13,8 @@ export const AXIS = {
   ticks: { stroke: "#2a323c", width: 1, size: 4 },
 };
 
+const MOST_LINES = 6;
+
 /** Keep a plot as wide as its box for as long as it is on the page. */
 export function fitWidth(plot, box) {
   const watch = new ResizeObserver(() => {
@@ -24,11 +26,12 @@ export function fitWidth(plot, box) {
   watch.observe(box);
 }
 
-/** A logarithmic axis with lines at the powers of ten only. */
+/** A logarithmic axis with lines at powers of ten only, at most MOST_LINES of them. */
 export function decades(low, high) {
   const first = Math.floor(Math.log10(low) + 1e-9);
   const last = Math.ceil(Math.log10(high) - 1e-9);
-  return Array.from({ length: last - first + 1 }, (_, i) => 10 ** (first + i));
+  const step = Math.ceil((last - first + 1) / MOST_LINES);
+  return Array.from({ length: Math.floor((last - first) / step) + 1 }, (_, i) => 10 ** (first + i * step));
 }
 
 /** Labels of decades; the lowest would run into the other axis. */

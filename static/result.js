@@ -1,10 +1,11 @@
 // What an identification found, and how far it is while it runs.
 
 import { percent, short } from "./comfort.js";
-import { DETERMINED, isBounded } from "./controls.js";
+import { DETERMINED, isBounded, valuesOf, withValues } from "./controls.js";
 import { costChart } from "./cost.js";
 import { $, breakable, fileName, h, saveFile, symbol } from "./dom.js";
 import { distinct, nameOf } from "./names.js";
+import { get } from "./store.js";
 import * as units from "./units.js";
 import { worded } from "./wording.js";
 
@@ -41,6 +42,7 @@ export function view(job, holdouts, apply) {
     h("div", { className: "fit-side scrolls" },
       h("button", { type: "button", id: "apply", className: "primary wide",
         on: { click: () => apply(result) } }, "Apply to sliders"),
+      ofAnotherCar(result),
       scores(job, holdouts),
       h("button", { type: "button", className: "wide", title: "fit.json, also for the command line",
         on: { click: () => saveFile(result, `${fileName(job.runs[0].name)}-fit.json`) } },
@@ -65,6 +67,16 @@ function outcome(job) {
   if (!job.result) return STATES[job.state];
   const { result } = job;
   return `${result.outcome} ${units.number(result.seconds, 2)} s, ${result.simulations} simulations.`;
+}
+
+/** A fit holds for the known data it was made with: the stiffnesses of one car suit no other. */
+function ofAnotherCar({ vehicle }) {
+  const now = get("vehicle");
+  const known = (car) => JSON.stringify({ ...withValues(car, valuesOf(now)), name: "", source: "" });
+  if (known(vehicle) === known(now)) return null;
+  return h("p", { className: "more", id: "other-car" }, vehicle.name === now.name
+    ? "Found before the car's known data were changed; identify again."
+    : `Found for “${vehicle.name}”, but the sliders belong to “${now.name}”.`);
 }
 
 /** In a low window the warnings lie below the table; this leads there. */

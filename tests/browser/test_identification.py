@@ -109,6 +109,15 @@ def test_an_uploaded_file_is_identified(visitor):
     assert len(estimates) == 4
     assert all("…" in row.inner_text() for row in estimates)
 
+    # Of another car than the sliders' it says so.
+    assert not visitor.element("#other-car").is_visible()
+    visitor.click("#tab-car")
+    visitor.page.get_by_label("Reference cars").select_option("bmw-320i")
+    visitor.until("ridetune.state('vehicle').name.includes('BMW')")
+    visitor.click("#tab-identification")
+    assert "but the sliders belong to “BMW 320i”" in visitor.element("#other-car").inner_text()
+    visitor.settled()
+
 
 def test_an_identification_is_cancelled(visitor):
     visitor.page.dblclick("#identify")
@@ -160,6 +169,10 @@ def test_without_a_measurement_the_page_says_what_to_do(visitor):
         visitor.click(".measurement-detail button.danger")
         visitor.click(".measurement-detail button.danger")
         visitor.until(f"ridetune.state('measurements').length === {left}")
+        where = visitor.page.evaluate(
+            "document.activeElement.closest('.measurement-list') !== null"
+        )
+        assert where, "the focus stays with the list"
     assert "Add a CSV file" in visitor.element("#measurements").inner_text()
     visitor.until("ridetune.state('ride').kind === 'manoeuvre' && ridetune.state('now') !== null")
     visitor.click("#identify")

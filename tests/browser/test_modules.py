@@ -197,3 +197,15 @@ def test_sentences_of_the_service_are_said_in_the_pages_words(visitor, said, sho
         said,
     )
     assert text == shown
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "lines"),
+    [
+        (2e-3, 0.5, [1e-3, 1e-2, 1e-1, 1]),
+        (1e-12, 1, [10.0**k for k in (-12, -9, -6, -3, 0)]),
+    ],
+)
+def test_a_logarithmic_axis_has_few_lines_at_powers_of_ten(visitor, low, high, lines):
+    found = in_module(visitor, "plots", "return m.decades(a[0], a[1]);", low, high)
+    assert found == pytest.approx(lines)
