@@ -7,7 +7,7 @@ of the rims mode once for all of them.
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import get_args
+from typing import TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from .simulation import Traction
 from .vehicle import Vehicle
 
 Array = NDArray[np.float64]
+Given = TypeVar("Given")
 
 MOVES = 1.2
 """A channel moves when its standard deviation is more than this many times that of its noise."""
@@ -116,13 +117,17 @@ class Problem:
         settings = settings or RimsSettings()
         if traction not in get_args(Traction):
             raise ProblemError(f'traction is "{traction}"; it can be "exact" or "paper".')
-        start = {parameter(name).name: value for name, value in (start or {}).items()}
+        start = _by_name(start or {}, "start value")
         try:
             vehicle = vehicle.with_values(start)
         except VehicleError as error:
             raise ProblemError(f"A start value cannot be used: {error}") from error
         names = _free_names(free, fixed)
-        limits = {parameter(name).name: limit for name, limit in (bounds or {}).items()}
+        limits = _by_name(bounds or {}, "pair of bounds")
+        if held := [name for name in limits if name not in names]:
+            raise ProblemError(
+                f"Bounds are given for {held[0]}, which is not free; free it or leave them out."
+            )
         parameters = tuple(_free_parameter(vehicle, name, limits.get(name)) for name in names)
         compared = _compared_runs(vehicle, runs, noise or {}, outputs, settings)
         samples = sum(len(measured) for seen in compared for measured in seen.measured.values())
@@ -147,6 +152,17 @@ class Problem:
         """The car at the optimiser's variables x."""
         names = (one.name for one in self.free)
         return self.vehicle.with_values(dict(zip(names, self.values(x).tolist(), strict=True)))
+
+
+def _by_name(given: Mapping[str, Given], what: str) -> dict[str, Given]:
+    """Values by the parameters' names, which may be given by symbol."""
+    named: dict[str, Given] = {}
+    for key, value in given.items():
+        name = parameter(key).name
+        if name in named:
+            raise ProblemError(f"{name} has more than one {what}; give one, by name or by symbol.")
+        named[name] = value
+    return named
 
 
 def _free_names(free: Iterable[str] | None, fixed: Iterable[str] | None) -> list[str]:

@@ -46,12 +46,12 @@ export function view() {
 export const names = () =>
   get("parameters").map(({ name }) => name).filter((name) => !fixed.has(name));
 
-/** {name: [lower, upper]} of the parameters whose bounds are not the default. */
+/** {name: [lower, upper]} of the free parameters whose bounds are not the default. */
 export async function bounds() {
   await askBounds();
-  return Object.fromEntries(get("parameters")
-    .filter(({ name }) => heldBounds(name) || typed[name]?.some((bound) => bound !== null))
-    .map(({ name }) => [name, boundsOf(name)]));
+  return Object.fromEntries(names()
+    .filter((name) => heldBounds(name) || typed[name]?.some((bound) => bound !== null))
+    .map((name) => [name, boundsOf(name)]));
 }
 
 let asking = null;

@@ -42,6 +42,16 @@ def test_free_and_fixed_take_names_and_symbols():
     assert len(held.free) == 10
 
 
+def test_bounds_and_starts_that_would_be_ignored_are_refused():
+    held = refused(CAR, [recording()], fixed=[BAR], bounds={BAR: (1.0, 2.0)})
+    assert f"Bounds are given for {BAR}, which is not free" in held
+    twice = refused(CAR, [recording()], start={"K_F": 3e4, SPRING: 4e4})
+    assert f"{SPRING} has more than one start value" in twice
+    assert "more than one pair of bounds" in refused(
+        CAR, [recording()], bounds={"K_F": (1e4, 3e4), SPRING: (1e4, 4e4)}
+    )
+
+
 def test_start_values_become_the_car():
     problem = Problem.build(CAR, [recording()], fixed=[BAR], start={BAR: 0.0, "K_F": 30000.0})
     assert problem.vehicle.value(BAR) == 0.0
