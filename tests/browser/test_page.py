@@ -63,12 +63,12 @@ def test_a_ride_is_never_shown_with_the_road_of_another(spectator):
     Oracle: the picture of the ride before. A road that cannot be driven leaves the car at rest.
     """
     spectator.expect("status of 422")
-    seek(spectator, 16.0)
-    before = spectator.picture()
     wheels, rest = (SAMPLES / "detailed_manoeuvre_1.csv").read_bytes().split(b"\n", 1)
     wrong = re.sub(rb"(wheel\.\w+\.z) \[mm\]", rb"\1 [m]", wheels) + b"\n" + rest
     add_file(spectator, "in_metres.csv", wrong)
     spectator.until("ridetune.state('measurements').length === 3")
+    seek(spectator, 16.0)
+    before = spectator.picture()
     spectator.page.select_option("#ride", label="in_metres.csv")
     spectator.until("ridetune.state('trouble') !== null")
     spectator.settled()
