@@ -8,14 +8,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .channels import Run, channel
 from .filters import low_pass, too_coarse
 from .frames import CORNERS, GRAVITY
 from .wheel_order import exchanged_wheels
-
-Array = NDArray[np.float64]
 
 REST_WINDOW = 0.5
 """The start of a record looked at for rest, s."""
@@ -38,8 +35,14 @@ STILL = 0.1
 SLOW = 1.0
 """a_x and v_x are compared below this frequency, Hz."""
 
+SLOW_MOTION, SLOW_SHARE = 1e-3, 0.3
+"""Standard deviation below 1 Hz, m and as a share of the whole, from which a wheel moves slowly."""
+
 VARIES = 0.2
 """dv_x/dt must vary by this much, m/s2 rms, to be held against a_x."""
+
+ALIKE = 0.8
+"""Correlation of the two below which one of them is noise and nothing is said."""
 
 LEAST_SLOPE, MOST_SLOPE = 0.35, 2.5
 """dv_x/dt over a_x between which both are believed: a body-fixed a_x contains some gravity."""
@@ -63,17 +66,13 @@ class Finding(NamedTuple):
     fault: bool
 
 
-def check_recording(run: Run, distance: Array, wheelbase: float) -> list[Finding]:
-    """Findings about one run that has the channels of the rims mode.
-
-    distance : (samples,) travelled, m
-    wheelbase : m
-    """
+def check_recording(run: Run, wheelbase: float) -> list[Finding]:
+    """Findings about one run that has the channels of the rims mode, of a car of a wheelbase, m."""
     return [
         *(Finding(sentence, False) for sentence in (*_gaps(run), *_rest_values(run))),
         *_acceleration_against_speed(run),
         *(Finding(sentence, True) for sentence in _one_wheel_turned_over(run)),
-        *(Finding(sentence, True) for sentence in exchanged_wheels(run, distance, wheelbase)),
+        *(Finding(sentence, True) for sentence in exchanged_wheels(run, wheelbase)),
     ]
 
 
@@ -115,7 +114,8 @@ def _rest_values(run: Run) -> list[str]:
 def _acceleration_against_speed(run: Run) -> list[Finding]:
     """Fits dv_x/dt = c + s a_x, both below 1 Hz; s is 1 when sign and unit are right.
 
-    Only the sense of rolling resistance depends on v_x, so that a wrong v_x is no fault.
+    Only the sense of rolling resistance depends on v_x, so that a wrong v_x is no fault, nor is a
+    difference of which nobody knows whose it is.
     """
     if "chassis.v_x" not in run or too_coarse(float(np.mean(np.diff(run.time))), SLOW):
         return []
@@ -123,7 +123,10 @@ def _acceleration_against_speed(run: Run) -> list[Finding]:
     gained, a_x = np.gradient(slow[:, 0], run.time), slow[:, 1]
     if np.std(gained) < VARIES or np.std(a_x) == 0.0:
         return []
-    slope = float(np.cov(gained, a_x)[0, 1] / np.var(a_x, ddof=1))
+    alike = float(np.corrcoef(gained, a_x)[0, 1])
+    if abs(alike) < ALIKE:
+        return []
+    slope = alike * float(np.std(gained) / np.std(a_x))
     if slope < -LEAST_SLOPE:
         return [_opposed(run, float(np.mean(slow[:, 0])))]
     if LEAST_SLOPE < slope < MOST_SLOPE:
@@ -135,7 +138,7 @@ def _acceleration_against_speed(run: Run) -> list[Finding]:
             return [
                 Finding(f"{changes}; {doubt} {header}: correct the header.", name == "chassis.a_x")
             ]
-    return [Finding(f"{changes}; check the units of both.", True)]
+    return [Finding(f"{changes}; check the units of both.", False)]
 
 
 def _opposed(run: Run, mean_speed: float) -> Finding:
@@ -153,17 +156,18 @@ def _opposed(run: Run, mean_speed: float) -> Finding:
 def _one_wheel_turned_over(run: Run) -> list[str]:
     """An axle whose wheels go against each other while those of the other go together.
 
-    Below 1 Hz a road lifts left and right alike; a rig that rolls or warps the car turns both
-    axles.
+    Below 1 Hz a road that has anything there lifts left and right alike; a rig that rolls or warps
+    the car turns both axles.
     """
     wheels = [f"wheel.{corner}.z" for corner in CORNERS]
     if too_coarse(float(np.mean(np.diff(run.time))), SLOW):
         return []
-    slow = low_pass(run.time, np.column_stack([run[name] for name in wheels]), SLOW)
+    heights = np.column_stack([run[name] for name in wheels])
+    slow = low_pass(run.time, heights, SLOW)
     slow = slow - slow.mean(axis=0)
-    size = np.linalg.norm(slow, axis=0)
-    if np.any(size == 0.0):
+    if np.any(np.std(slow, axis=0) < np.maximum(SLOW_MOTION, SLOW_SHARE * np.std(heights, axis=0))):
         return []
+    size = np.linalg.norm(slow, axis=0)
     together = [
         float(slow[:, left] @ slow[:, left + 1]) / (size[left] * size[left + 1]) for left in (0, 2)
     ]

@@ -11,6 +11,7 @@ Heights are averaged over CELL, which takes off the sensors' noise, and compared
 RISE, which keeps what left and right tracks do not share and hills do not hide.
 """
 
+import operator
 from itertools import permutations
 
 import numpy as np
@@ -35,31 +36,39 @@ ALIKE = 0.7
 FAR_LESS = 0.85
 """The order as given is doubted when its correlation is below this share of the best one's."""
 
-TIE = 0.05
-"""Orders whose correlations differ by less are told apart by roll."""
+TIE, ROLL_TIE = 0.05, 0.3
+"""Orders whose correlations differ by less are told apart by roll, and where those of roll differ
+by less, by how many columns they move."""
+
+NEAR = 0.2
+"""Share of the wheelbase by which speed or wheelbase may be off: the order as given must not be
+alike within it either. On a sine road every distance is alike somewhere."""
 
 AS_GIVEN: Order = (0, 1, 2, 3)
 
 
-def exchanged_wheels(run: Run, distance: Array, wheelbase: float) -> list[str]:
+def exchanged_wheels(run: Run, wheelbase: float) -> list[str]:
     """A sentence where the wheels' columns are probably exchanged.
 
-    distance : (samples,) travelled, m; what is driven backwards is not looked at
     wheelbase : m
+    Nothing is said without chassis.v_x: a_x integrated makes a rig drive. What is driven backwards
+    is not looked at.
     """
-    rises = _rises(run, distance)
+    if "chassis.v_x" not in run:
+        return []
+    rises = _rises(run, cumulative_trapezoid(run["chassis.v_x"], run.time, initial=0.0))
     behind = round(wheelbase / CELL)
-    if rises.shape[1] < behind + SHORTEST / CELL or np.any(np.ptp(rises, axis=1) == 0.0):
+    furthest = round(NEAR * wheelbase / CELL)
+    if rises.shape[1] < behind + furthest + SHORTEST / CELL or np.any(np.ptp(rises, axis=1) == 0.0):
         return []
-    follows = np.corrcoef(rises[:, :-behind], rises[:, behind:])[:4, 4:]
-    likeness = {
-        order: 0.5 * float(follows[order[0], order[2]] + follows[order[1], order[3]])
-        for order in permutations(AS_GIVEN)
-    }
+    likeness = _likeness(rises, behind)
     best = max(likeness.values())
-    if best < ALIKE or likeness[AS_GIVEN] > FAR_LESS * best:
+    given = max(
+        _likeness(rises, lag)[AS_GIVEN] for lag in range(behind - furthest, behind + furthest + 1)
+    )
+    if best < ALIKE or given > FAR_LESS * best:
         return []
-    order = _by_roll(run, [one for one, value in likeness.items() if value > best - TIE])
+    order = _likeliest(run, [one for one, value in likeness.items() if value > best - TIE])
     read = [
         f"{WHEEL_CHANNELS[wheel]} in column {WHEEL_CHANNELS[column]}"
         for wheel, column in enumerate(order)
@@ -72,8 +81,20 @@ def exchanged_wheels(run: Run, distance: Array, wheelbase: float) -> list[str]:
     ]
 
 
+def _likeness(rises: Array, lag: int) -> dict[Order, float]:
+    """By order, the mean correlation of the sides' front rises with the rear ones `lag` later."""
+    follows = np.corrcoef(rises[:, :-lag], rises[:, lag:])[:4, 4:]
+    return {
+        order: 0.5 * float(follows[order[0], order[2]] + follows[order[1], order[3]])
+        for order in permutations(AS_GIVEN)
+    }
+
+
 def _rises(run: Run, distance: Array) -> Array:
-    """Rise of each wheel over RISE, (4, cells), at equal distances along the road."""
+    """Rise of each wheel over RISE, (4, cells), at equal distances along the road.
+
+    distance : (samples,) travelled, m
+    """
     furthest = np.maximum.accumulate(distance)
     forward = np.flatnonzero(np.diff(furthest, prepend=-np.inf) > 0.0)
     travelled = furthest[forward]
@@ -86,14 +107,22 @@ def _rises(run: Run, distance: Array) -> Array:
     return heights[:, cells:] - heights[:, :-cells]
 
 
-def _by_roll(run: Run, orders: list[Order]) -> Order:
-    """Of orders equally likely the one whose wheels roll as the chassis does, or the first."""
-    if "chassis.roll" not in run:
-        return orders[0]
-    rolled = run["chassis.roll"] - np.mean(run["chassis.roll"])
+def _likeliest(run: Run, orders: list[Order]) -> Order:
+    """Of orders that follow equally well those whose wheels roll as the chassis does, if roll tells
+    at all; of these the one that moves the fewest columns.
+    """
+    rolls = {order: _rolls_along(run, order) for order in orders}
+    best = max(rolls.values())
+    return min(
+        (order for order in orders if rolls[order] > best - ROLL_TIE),
+        key=lambda order: sum(map(operator.ne, order, AS_GIVEN)),
+    )
 
-    def along(order: Order) -> float:
-        fl, fr, rl, rr = (run[WHEEL_CHANNELS[column]] for column in order)
-        return float((fl - fr + rl - rr) @ rolled)
 
-    return max(orders, key=along)
+def _rolls_along(run: Run, order: Order) -> float:
+    """Correlation of the chassis's roll with that of its wheels; 0 without either."""
+    fl, fr, rl, rr = (run[WHEEL_CHANNELS[column]] for column in order)
+    wheels = fl - fr + rl - rr
+    if "chassis.roll" not in run or np.ptp(wheels) == 0.0 or np.ptp(run["chassis.roll"]) == 0.0:
+        return 0.0
+    return float(np.corrcoef(wheels, run["chassis.roll"])[0, 1])
