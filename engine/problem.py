@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from .channels import OUTPUT_CHANNELS, Run
 from .errors import ProblemError, VehicleError
+from .filters import low_pass, too_coarse
 from .parameters import PARAMETER_NAMES, default_bounds, parameter
 from .rims import RimsInputs, filtered_outputs, prepare
 from .rims_settings import RimsSettings
@@ -26,6 +27,9 @@ Given = TypeVar("Given")
 
 MOVES = 1.2
 """A channel moves when its standard deviation is more than this many times that of its noise."""
+
+FAST = 5.0
+"""Frequency, Hz, above which a channel shows its noise."""
 
 SENSORS_BEST = 0.02
 """Share of the default noise below which no sensor's own noise is taken to lie."""
@@ -136,10 +140,11 @@ class Problem:
                 f"{samples} samples cannot determine {len(parameters)} parameters; free fewer "
                 "or measure longer."
             )
+        stated = (set(run.noise) | set(noise or {}) for run in runs)
         if not any(
-            _moves(channel, values, {**run.noise, **(noise or {})}.get(channel))
-            for run, seen in zip(runs, compared, strict=True)
-            for channel, values in seen.measured.items()
+            _moves(run, channel, seen.noise[channel], channel in known)
+            for run, seen, known in zip(runs, compared, stated, strict=True)
+            for channel in seen.measured
         ):
             raise ProblemError(_at_rest(compared))
         return cls(vehicle, compared, parameters, traction, settings)
@@ -274,15 +279,17 @@ def _compared_runs(
     return tuple(found)
 
 
-def _moves(channel: str, values: Array, stated: float | None) -> bool:
+def _moves(run: Run, channel: str, noise: float, stated: bool) -> bool:
     """Whether a channel moves more than its noise: as stated, else as the record shows it.
 
-    White noise of deviation s has second differences of deviation sqrt(6) s; a body sampled fast
-    enough has hardly any.
+    A body hardly moves above FAST; what is there is noise, taken to be as dense below.
     """
-    default = DEFAULT_NOISE[channel]
-    seen = float(np.std(np.diff(values, 2))) / math.sqrt(6.0)
-    noise = stated or min(max(seen, SENSORS_BEST * default), default)
+    step = float(np.mean(np.diff(run.time)))
+    values = run[channel]
+    if not stated and not too_coarse(step, FAST):
+        fast = float(np.std(values - low_pass(run.time, values, FAST)))
+        seen = fast / math.sqrt(1.0 - 2.0 * step * FAST)
+        noise = min(max(seen, SENSORS_BEST * noise), noise)
     return float(np.std(values)) > MOVES * noise
 
 

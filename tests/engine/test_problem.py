@@ -5,8 +5,10 @@ import numpy as np
 import pytest
 from ridetune.engine.channels import INPUT_CHANNELS, OUTPUT_CHANNELS, Run
 from ridetune.engine.errors import MeasurementError, ParameterError, ProblemError
+from ridetune.engine.filters import low_pass
 from ridetune.engine.parameters import PARAMETER_NAMES
 from ridetune.engine.problem import DEFAULT_NOISE, FreeParameter, Problem
+from ridetune.engine.rims_settings import RimsSettings
 
 from ..factories import paper_vehicle
 
@@ -143,8 +145,24 @@ def test_a_standing_car_is_refused_unless_its_noise_is_smaller():
     for size in (0.0, 1.0):
         noise = {name: size * DEFAULT_NOISE[name] * rng.normal(size=1001) for name in DEFAULT_NOISE}
         run = Run("parked", time, {**still, **noise})
-        assert "run parked: chassis.z, chassis.pitch, chassis.roll stay" in refused(CAR, [run])
+        for cutoff in (None, 20.0):
+            settings = RimsSettings(output_cutoff_hz=cutoff)
+            sentence = refused(CAR, [run], settings=settings)
+            assert "run parked: chassis.z, chassis.pitch, chassis.roll stay" in sentence
     assert Problem.build(CAR, [run], noise={"chassis.z": 0.1 * DEFAULT_NOISE["chassis.z"]})
+
+
+def test_a_standing_car_whose_logger_filters_is_refused():
+    """The default noise through a logger's 30 Hz filter, which leaves it smooth at 200 Hz."""
+    rng = np.random.default_rng(1)
+    time = 0.005 * np.arange(2001)
+    still = dict.fromkeys(INPUT_CHANNELS, np.zeros_like(time))
+    white = rng.normal(size=(len(DEFAULT_NOISE), time.size))
+    noise = {
+        name: size * low_pass(time, row, 30.0)
+        for (name, size), row in zip(DEFAULT_NOISE.items(), white, strict=True)
+    }
+    assert "Nothing can be learnt" in refused(CAR, [Run("parked", time, {**still, **noise})])
 
 
 def test_small_motion_of_quiet_sensors_is_no_noise():
