@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import medfilt
 
 from .fit import ParameterEstimate
 from .problem import ComparedRun
@@ -31,8 +32,8 @@ EXCHANGED = {
 ALIKE = 5.0
 """Factor between measured and model amplitude up to which their signs are compared."""
 
-SPAN = (2.0, 98.0)
-"""Percentiles between which amplitudes are compared; single spikes lie outside."""
+DESPIKED = 5
+"""Samples of the running median before amplitudes are compared; two spikes in a row lie outside."""
 
 STANDING = {"chassis.z": 0.1, "chassis.pitch": 0.06, "chassis.roll": 0.06}
 """Standard deviation (m, rad) beyond which a model has fallen over and is no witness."""
@@ -68,12 +69,10 @@ def correlation(measured: Array, model: Array) -> float:
 
 def _amplitude_ratio(channel: str, measured: Array, model: Array) -> float:
     """Measured over model amplitude; 0 for a model that never moves or has fallen over."""
-    if not 0.0 < float(np.std(model)) < STANDING[channel]:
-        return 0.0
-    measured_span, model_span = (
-        float(np.ptp(np.percentile(one, SPAN))) for one in (measured, model)
+    measured_amplitude, amplitude = (
+        float(np.std(medfilt(one, DESPIKED))) for one in (measured, model)
     )
-    return measured_span / model_span if model_span > 0.0 else 0.0
+    return measured_amplitude / amplitude if 0.0 < amplitude < STANDING[channel] else 0.0
 
 
 def wrong_sign(run: str, channel: str, measured: Array, start: Array, fitted: Array) -> str | None:

@@ -36,8 +36,8 @@ FEWEST_SAMPLES = 10
 COARSEST_STEP = 0.2
 """Time between samples, s, from which on the unit of time is doubtful."""
 
-SPIKES = 0.01
-"""Share of the samples up to which values too great to be true are spikes, not a wrong unit."""
+LONGEST_SPIKE = 3
+"""Samples in a row up to which values too great to be true are a spike, not a wrong unit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,7 +246,7 @@ def _doubtful_magnitude(
     info, peak = column.info, float(np.max(np.abs(values)))
     shown = f"{peak / column.factor:.4g} {column.unit or info.unit}"
     beyond = np.flatnonzero(np.abs(values) > info.largest)
-    if 0 < beyond.size <= SPIKES * values.size:
+    if beyond.size and _stand_alone(beyond, values):
         return [
             f"{info.name} jumps to {shown}, which no car does, for {beyond.size} of {values.size} "
             f"samples from {time[beyond[0]]:.4g} s on; repair or cut these spikes."
@@ -259,3 +259,14 @@ def _doubtful_magnitude(
         doubt = f"is it in {info.unit}?" if column.factor < 1.0 else "check its unit."
         return [f"{info.name} stays within {shown}; {doubt}"]
     return []
+
+
+def _stand_alone(beyond: NDArray[np.int64], values: NDArray[np.float64]) -> bool:
+    """Whether all samples of great value are spikes: few in a row, above their neighbours."""
+    sizes = np.pad(np.abs(values), 1)
+    groups = np.split(beyond, np.flatnonzero(np.diff(beyond) > 1) + 1)
+    return all(
+        len(group) <= LONGEST_SPIKE
+        and max(sizes[group[0]], sizes[group[-1] + 2]) < 0.5 * np.max(sizes[group + 1])
+        for group in groups
+    )

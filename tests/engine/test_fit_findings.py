@@ -55,6 +55,15 @@ def test_a_spike_is_no_mistaken_unit():
     assert wrong_unit("lap", "chassis.z", spiked, BODY) is None
 
 
+def test_a_car_that_stands_most_of_the_time_has_no_mistaken_unit():
+    """A bump of a second in two minutes of rest: the noise of the rest is not the motion."""
+    time = np.arange(0.0, 120.0, 0.005)
+    bump = 0.01 * np.exp(-(((time - 100.0) / 0.3) ** 2)) * np.sin(8.0 * (time - 100.0))
+    noisy = bump + 1e-4 * np.random.default_rng(8).normal(size=time.size)
+    assert wrong_unit("lap", "chassis.z", noisy, bump) is None
+    assert "multiply it by -1" in wrong_sign("lap", "chassis.z", -noisy, bump, bump)
+
+
 def test_a_model_that_has_fallen_over_is_no_witness():
     """A car on its nose by 0.3 rad looks like degrees taken for radians, the other way round."""
     fallen = 0.3 * np.tanh(TIME - 8.0)

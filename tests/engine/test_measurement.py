@@ -294,6 +294,20 @@ def test_a_doubtful_magnitude_is_questioned(title, peak, warning):
     assert warning in parse({"time [s]": TIME, title: values}).warnings
 
 
+@pytest.mark.parametrize(
+    ("run", "channel"),
+    [("detailed_manoeuvre_1", "chassis.pitch"), ("paper_twin_2", "chassis.roll")],
+)
+def test_a_motion_that_peaks_beyond_its_unit_is_no_spike(run, channel):
+    """Degrees under a header that says rad: the peaks alone are beyond what a car does."""
+    recorded = read_run(Path(ridetune.sample_runs.__path__[0]) / f"{run}.csv")
+    degrees = np.degrees(recorded[channel])
+    columns = {"time [s]": recorded.time, f"{channel} [rad]": degrees}
+    [warning] = parse(columns).warnings
+    assert f"{channel} reaches" in warning
+    assert "is it in deg?" in warning
+
+
 def test_a_spike_is_named_with_its_place_and_not_taken_for_a_unit():
     time = np.linspace(0.0, 10.0, 2001)
     values = 0.01 * np.sin(time)
