@@ -22,14 +22,18 @@ WINDOW = 0.2
 FEWEST_SAMPLES = 10
 """Samples in the window without which no rate is taken from it."""
 
-FIRST, LATER = 0.4, 1.5
-"""A car's own swing fills the time until FIRST, s, and has died away LATER."""
+BODY = 8.0
+"""A body's usual own frequency, rad/s, by which a rate makes a swing of so much."""
 
-SWING = {"chassis.z": 2e-3, "chassis.pitch": math.radians(0.15), "chassis.roll": math.radians(0.15)}
-"""Rms distance of the record from the model in the FIRST seconds that is told of, SI."""
+SWING = {"chassis.z": 1.5e-3, "chassis.pitch": math.radians(0.1), "chassis.roll": math.radians(0.1)}
+"""Swing of the model about the record that is told of, SI."""
 
-MUCH_FURTHER = 1.5
-"""It must exceed the distance LATER, which comes from other causes, by this factor."""
+BEYOND_NOISE = 3.0
+"""It must exceed so many of its standard errors ..."""
+
+FIRST, LATER, FURTHER = 0.4, 1.5, 1.5
+"""... and the record be further from the model until FIRST, s, than from LATER on, when the swing
+has died away and other causes are left, by the factor FURTHER."""
 
 
 def measured_state(run: Run) -> Array:
@@ -55,7 +59,12 @@ def measured_state(run: Run) -> Array:
 
 
 def swings_in(
-    name: str, time: Array, measured: Mapping[str, Array], model: Mapping[str, Array]
+    name: str,
+    time: Array,
+    measured: Mapping[str, Array],
+    model: Mapping[str, Array],
+    *,
+    remedy: str = 'begin the run at rest, or take the initial state "measured"',
 ) -> list[str]:
     """A sentence where the model, begun in equilibrium, swings into the record's motion.
 
@@ -64,21 +73,33 @@ def swings_in(
     measured, model : z, pitch and roll, those there are, SI
     """
     since = time - time[0]
-    at_first, later = since <= FIRST, since >= LATER
-    found = []
-    for channel, values in measured.items():
-        off = np.square(values - model[channel])
-        first, rest = (
-            math.sqrt(np.mean(off[part])) if part.any() else 0.0 for part in (at_first, later)
-        )
-        if first > max(SWING[channel], MUCH_FURTHER * rest):
-            found.append(channel)
+    found = [
+        channel
+        for channel, values in measured.items()
+        if _swings(since, values - model[channel], SWING[channel])
+    ]
     if not found:
         return []
     return [
         f"Run {name} starts away from rest ({', '.join(found)}), but the model starts from "
-        'equilibrium; begin the run at rest, or take the initial state "measured".'
+        f"equilibrium; {remedy}."
     ]
+
+
+def _swings(since: Array, off: Array, least: float) -> bool:
+    """Whether a record's distance from the model (samples,) begins with a swing that dies away."""
+    at_first, later = since <= FIRST, since >= LATER
+    window = since <= WINDOW
+    if not later.any() or np.count_nonzero(window) < FEWEST_SAMPLES:
+        return False
+    powers = np.vander(since[window], 3, increasing=True)
+    inverse = np.linalg.pinv(powers)
+    parabola = inverse @ off[window]
+    left = off[window] - powers @ parabola
+    errors = np.linalg.norm(inverse, axis=1) * math.sqrt(left @ left / (left.size - 3))
+    swing, error = (math.hypot(one[0], one[1] / BODY) for one in (parabola, errors))
+    first, rest = (math.sqrt(np.mean(np.square(off[part]))) for part in (at_first, later))
+    return swing > max(least, BEYOND_NOISE * error) and first > FURTHER * rest
 
 
 def _window(run: Run) -> tuple[Array, NDArray[np.int64]]:

@@ -168,7 +168,7 @@ def simulate_rims(
         _load_shares(result),
         inputs.node_time.size - 1,
         _fit_percent(result, run, settings),
-        (*inputs.warnings, *ignored, *_swing(result, run, settings)),
+        (*inputs.warnings, *ignored, *_swing(result, run, model, settings)),
     )
 
 
@@ -347,12 +347,14 @@ def _fit_percent(simulated: Run, measured: Run, settings: RimsSettings) -> dict[
     return scores
 
 
-def _swing(simulated: Run, measured: Run, settings: RimsSettings) -> list[str]:
+def _swing(simulated: Run, measured: Run, model: Model, settings: RimsSettings) -> list[str]:
     """A sentence where the record starts away from the equilibrium in which the model starts."""
-    if settings.initial_state == "measured":
-        return []
-    outputs = (filtered_outputs(run, settings.output_cutoff_hz) for run in (measured, simulated))
-    return swings_in(measured.name, measured.time, *outputs)
+    name, time, cutoff = measured.name, measured.time, settings.output_cutoff_hz
+    recorded, followed = (filtered_outputs(run, cutoff) for run in (measured, simulated))
+    if model == "7dof":
+        remedy = "begin the run at rest, as the 7-DOF model does"
+        return swings_in(name, time, recorded, followed, remedy=remedy)
+    return [] if settings.initial_state == "measured" else swings_in(name, time, recorded, followed)
 
 
 def _load_shares(run: Run) -> dict[str, float]:

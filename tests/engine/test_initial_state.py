@@ -35,6 +35,12 @@ def cut(run, begin):
     return Run(run.name, run.time[first:], channels)
 
 
+def contact_with_bump():
+    """When the first wheel has been lifted by a millimetre."""
+    run = simulate_road(CAR, reference_manoeuvres()["bump"]).run
+    return run.time[np.argmax(run["wheel.fl.z"] > 1e-3)]
+
+
 def told(warnings):
     return [one for one in warnings if "starts away from rest" in one]
 
@@ -50,6 +56,19 @@ def test_a_swing_that_dies_away_names_its_channels(channel):
 def test_a_misfit_that_lasts_or_is_small_is_no_swing(misfit):
     """Rest values and poor parameters stay as they are; 1 mm is nothing to speak of."""
     assert swings_in("lap", TIME, {**STILL, "chassis.z": 0.01 * misfit}, STILL) == []
+
+
+def test_a_short_record_has_nothing_to_compare_its_beginning_with():
+    short = TIME < 1.4
+    swing = {"chassis.z": 0.01 * SWING[short]}
+    assert swings_in("lap", TIME[short], swing, {"chassis.z": 0.0 * SWING[short]}) == []
+
+
+def test_a_jolt_soon_after_the_start_is_no_swing():
+    """A bump 0.3 s from the start, under a car half as stiff as the model's."""
+    run = cut(driven("bump"), float(contact_with_bump()) - 0.3)
+    softer = {name: 0.5 * CAR.value(name) for name in PARAMETER_NAMES if ".suspension." in name}
+    assert not told(simulate_rims(CAR.with_values(softer), run).warnings)
 
 
 @pytest.mark.parametrize("key", ROADS)
@@ -68,6 +87,15 @@ def test_a_run_cut_out_of_a_ride_is_told_of_unless_its_start_is_taken_as_measure
     assert told(simulate_rims(CAR, ride).warnings)
     measured = RimsSettings(initial_state="measured")
     assert not told(simulate_rims(CAR, ride, settings=measured).warnings)
+
+
+def test_the_linear_model_cannot_take_a_start_as_measured():
+    ride = cut(driven("2"), 6.0)
+    measured = RimsSettings(initial_state="measured")
+    for settings in (RimsSettings(), measured):
+        [sentence] = told(simulate_rims(CAR, ride, model="7dof", settings=settings).warnings)
+        assert "begin the run at rest" in sentence
+        assert "take the initial state" not in sentence
 
 
 def test_a_fit_tells_of_a_run_cut_out_of_a_ride():
