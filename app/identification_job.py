@@ -4,14 +4,18 @@ The worker gets everything by value (vehicle, recordings, options), so it needs 
 database nor the data directory and may be another machine.
 """
 
+import hashlib
+import json
 from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..engine.channels import Run
+from ..engine.parameters import parameter
 from .errors import OverBudget
 from .job_store import Job
 from .jobs import Kind
 from .recordings import Recordings, with_braking
+from .schemas import IdentificationRequest
 from .settings import Limits
 from .store import Measurement, Store
 from .worker import Report
@@ -27,6 +31,17 @@ def identification(store: Store, recordings: Recordings) -> Kind:
         return {**job.spec, "runs": marked_runs(job.spec, kept, recordings)}
 
     return Kind(task=identify_runs, payload=payload)
+
+
+def as_asked(request: IdentificationRequest) -> str:
+    """What stands for a request: the same whenever it is sent, however it calls the parameters."""
+    form = request.model_dump(mode="json", exclude={"key"})
+    for role in ("free", "fixed"):
+        if form[role] is not None:
+            form[role] = sorted(parameter(name).name for name in form[role])
+    for given in ("bounds", "start"):
+        form[given] = sorted([parameter(name).name, value] for name, value in form[given].items())
+    return hashlib.sha256(json.dumps(form, sort_keys=True).encode()).hexdigest()
 
 
 def marked_runs(

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Row, delete, func, insert, select, update
+from sqlalchemy import Connection, Row, delete, func, insert, select, update
 
 from .database import Database
 from .errors import Busy, InvalidRequest, NotFound
@@ -60,13 +60,14 @@ class JobStore:
     def add(
         self, session: str, kind: str, spec: Mapping[str, Any], key: str | None
     ) -> tuple[Job, bool]:
-        """Keep a queued job, or find the one kept under the caller's key; whether it is new."""
+        """Keep a queued job, or find the one kept under the caller's key; whether it is new.
+
+        spec : with `asked`, see `known`
+        """
         with self._database.writing() as connection:
+            if (known := _known(connection, session, key, spec["asked"])) is not None:
+                return known, False
             mine = jobs.c.session == session
-            if key is not None:
-                known = connection.execute(_select(mine, jobs.c.key == key)).one_or_none()
-                if known is not None:
-                    return _same(_job(known), spec), False
             total = connection.execute(select(func.count()).where(mine)).scalar_one()
             unfinished = connection.execute(
                 select(func.count()).where(mine, jobs.c.state.in_(UNFINISHED))
@@ -93,6 +94,14 @@ class JobStore:
             )
             connection.execute(update(sessions).where(sessions.c.id == session).values(used=True))
             return _job(connection.execute(_select(jobs.c.id == job)).one()), True
+
+    def known(self, session: str, key: str | None, asked: str) -> Job | None:
+        """The job kept under the caller's key, if there is one.
+
+        asked : stands for the request; InvalidRequest where the key is that of another one
+        """
+        with self._database.reading() as connection:
+            return _known(connection, session, key, asked)
 
     def get(self, session: str, job: str) -> Job:
         """One job of a session, with its result."""
@@ -185,9 +194,14 @@ def _select(*conditions: Any) -> Any:
     return select(jobs).where(*conditions)
 
 
-def _same(kept: Job, spec: Mapping[str, Any]) -> Job:
-    """The job kept under a key, which must not stand for anything else."""
-    if kept.spec != json.loads(json.dumps(dict(spec))):
+def _known(connection: Connection, session: str, key: str | None, asked: str) -> Job | None:
+    if key is None:
+        return None
+    row = connection.execute(_select(jobs.c.session == session, jobs.c.key == key)).one_or_none()
+    if row is None:
+        return None
+    kept = _job(row)
+    if kept.spec["asked"] != asked:
         raise InvalidRequest(
             "The key is that of an identification that was asked for differently; give each a key"
             " of its own.",

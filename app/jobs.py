@@ -82,6 +82,11 @@ class Jobs:
             self._sender.submit(self._send, job)
         return job
 
+    def known(self, session: str, key: str | None, asked: str) -> Job | None:
+        """The job kept under a key as it stands now, see `JobStore.known`."""
+        job = self._store.jobs.known(session, key, asked)
+        return None if job is None else self._with_progress(job)
+
     def get(self, session: str, job: str) -> Job:
         """A job as it stands now."""
         return self._with_progress(self._store.jobs.get(session, job))

@@ -11,7 +11,7 @@ from ..engine.vehicle_file import vehicle_from_json, vehicle_to_json
 from .access import SessionId
 from .errors import InvalidRequest, NotFound
 from .frames import clean
-from .identification_job import KIND, build_problem, check_budget, marked_runs
+from .identification_job import KIND, as_asked, build_problem, check_budget, marked_runs
 from .job_store import Job
 from .schemas import IdentificationRequest
 from .services import Services, Shared
@@ -62,6 +62,17 @@ async def submit(sid: SessionId, services: Shared, body: IdentificationRequest) 
 
 
 def _submitted(services: Services, sid: str, body: IdentificationRequest) -> dict[str, Any]:
+    """The job kept under the request's key whatever has changed since, else a new one."""
+    asked = as_asked(body)
+    job = services.jobs.known(sid, body.key, asked)
+    if job is None:
+        spec = {**_spec(services, sid, body), "asked": asked}
+        job = services.jobs.submit(sid, KIND, spec, body.key)
+    return job_to_json(job)
+
+
+def _spec(services: Services, sid: str, body: IdentificationRequest) -> dict[str, Any]:
+    """Everything that the job needs, checked."""
     kept = [services.store.measurement(sid, measurement) for measurement in body.runs]
     check_budget(kept, body.settings.step, services.settings.limits)
     vehicle = services.store.session(sid).vehicle if body.vehicle is None else body.vehicle
@@ -76,7 +87,7 @@ def _submitted(services: Services, sid: str, body: IdentificationRequest) -> dic
         )
     problem = build_problem(spec, marked_runs(spec, kept, services.recordings))
     spec["names"] = [parameter.name for parameter in problem.free]
-    return job_to_json(services.jobs.submit(sid, KIND, spec, body.key))
+    return spec
 
 
 @router.get("")

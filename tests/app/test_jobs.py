@@ -220,6 +220,27 @@ def test_the_same_key_submits_once(owner, clusters):
     assert len(owner.get("/identifications").json()) == 1
 
 
+def test_a_request_sent_again_is_the_same_job_whatever_has_changed_since(owner, clusters):
+    """The car is another one and the measurement gone; the names may be symbols, in any order."""
+    asked = {"key": "click-1", "start": {"K_F": 3e4}, "bounds": {"K_F": [1e4, 9e4]}}
+    first = submit(owner, free=["K_F", "rear.suspension.stiffness"], **asked)
+    run = first["runs"][0]["id"]
+    owner.post(f"/identifications/{first['id']}/cancel")
+    car = owner.get("/vehicle").json()
+    car["chassis"]["mass"] += 100.0
+    assert owner.put("/vehicle", json=car).status_code == 200
+    assert owner.delete(f"/measurements/{run}").status_code == 204
+    stiffness = "front.suspension.stiffness"
+    for free, start in (
+        (["K_F", "rear.suspension.stiffness"], {"K_F": 3e4}),
+        (["rear.suspension.stiffness", stiffness], {stiffness: 3e4}),
+    ):
+        body = {**asked, "runs": [run], "free": free, "start": start}
+        again = owner.post("/identifications", json=body)
+        assert (again.status_code, again.json().get("id")) == (202, first["id"]), again.text
+    assert len(owner.get("/identifications").json()) == 1
+
+
 def test_a_key_stands_for_one_request(owner, clusters):
     kept = submit(owner, key="click-1")
     runs = [run["id"] for run in kept["runs"]]

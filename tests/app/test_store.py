@@ -34,7 +34,7 @@ def recording(data: bytes = b"0 1 2") -> NewMeasurement:
 
 
 def queued(store: Store, session: str, key: str | None = None, runs: tuple[str, ...] = ()) -> str:
-    spec = {"runs": [{"id": run, "name": "run"} for run in runs]}
+    spec = {"runs": [{"id": run, "name": "run"} for run in runs], "asked": "a fit"}
     return store.jobs.add(session, "test", spec, key)[0].id
 
 
@@ -192,10 +192,13 @@ def test_a_measurement_in_use_is_not_deleted(store, session):
 
 
 def test_the_same_key_is_the_same_job(store, session):
-    first, new = store.jobs.add(session, "test", {"runs": []}, "mine")
-    again, newer = store.jobs.add(session, "test", {"runs": []}, "mine")
+    first, new = store.jobs.add(session, "test", {"runs": [], "asked": "a fit"}, "mine")
+    again, newer = store.jobs.add(session, "test", {"runs": [], "asked": "a fit"}, "mine")
     assert (new, newer) == (True, False)
     assert again.id == first.id
+    assert store.jobs.known(session, "mine", "a fit") == first
+    assert store.jobs.known(session, "yours", "a fit") is None
+    assert store.jobs.known(session, None, "a fit") is None
     other, _ = store.create_session(CAR, [])
     assert queued(store, other, key="mine") != first.id
 
