@@ -7,10 +7,11 @@ database nor the data directory and may be another machine.
 import hashlib
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from ..engine.channels import Run
-from ..engine.parameters import parameter
+from ..engine.parameters import PARAMETER_NAMES, parameter
 from .errors import OverBudget
 from .job_store import Job
 from .jobs import Kind
@@ -27,7 +28,10 @@ def identification(store: Store, recordings: Recordings) -> Kind:
     """The job kind, bound to where its recordings are kept."""
 
     def payload(job: Job) -> dict[str, Any]:
-        kept = [store.measurement(job.session, run["id"]) for run in job.spec["runs"]]
+        kept = [
+            replace(store.measurement(job.session, run["id"]), noise=run["noise"])
+            for run in job.spec["runs"]
+        ]
         return {**job.spec, "runs": marked_runs(job.spec, kept, recordings)}
 
     return Kind(task=identify_runs, payload=payload)
@@ -42,6 +46,19 @@ def as_asked(request: IdentificationRequest) -> str:
     for given in ("bounds", "start"):
         form[given] = sorted([parameter(name).name, value] for name, value in form[given].items())
     return hashlib.sha256(json.dumps(form, sort_keys=True).encode()).hexdigest()
+
+
+def filled_in(spec: Mapping[str, Any], problem: Any) -> dict[str, Any]:
+    """The spec with what holds where nothing is told, so that it means the same for ever."""
+    free = [one.name for one in problem.free]
+    started = {*free, *(parameter(name).name for name in spec["start"])}
+    return {
+        **spec,
+        "free": free,
+        "fixed": [name for name in PARAMETER_NAMES if name not in free],
+        "bounds": {one.name: [one.lower, one.upper] for one in problem.free},
+        "start": {name: problem.vehicle.value(name) for name in PARAMETER_NAMES if name in started},
+    }
 
 
 def marked_runs(

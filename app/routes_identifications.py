@@ -11,7 +11,14 @@ from ..engine.vehicle_file import vehicle_from_json, vehicle_to_json
 from .access import SessionId
 from .errors import InvalidRequest, NotFound
 from .frames import clean
-from .identification_job import KIND, as_asked, build_problem, check_budget, marked_runs
+from .identification_job import (
+    KIND,
+    as_asked,
+    build_problem,
+    check_budget,
+    filled_in,
+    marked_runs,
+)
 from .job_store import Job
 from .schemas import IdentificationRequest
 from .services import Services, Shared
@@ -22,14 +29,14 @@ router = APIRouter(
 )
 
 
-ASKED = ("fixed", "bounds", "start", "noise", "traction", "settings", "braking")
-"""Fields of a request that its job shows as they were."""
+ASKED = ("runs", "free", "fixed", "bounds", "start", "noise", "traction", "settings", "braking")
+"""Fields of a request that its job shows, with what held untold filled in."""
 
 
 def job_to_json(job: Job, *, with_result: bool = False) -> dict[str, Any]:
     """A job as the REST interface shows it: its state, and what was asked as the request names it.
 
-    free : the parameters that the request freed, one by one
+    runs : id and name of each, and the noise that was stated of it
     vehicle, result : only with the result
     """
     spec = job.spec
@@ -40,8 +47,6 @@ def job_to_json(job: Job, *, with_result: bool = False) -> dict[str, Any]:
         "created": _instant(job.created),
         "started": _instant(job.started),
         "finished": _instant(job.finished),
-        "runs": [{"id": run["id"], "name": run["name"]} for run in spec["runs"]],
-        "free": spec["names"],
         **{name: spec[name] for name in ASKED},
         "progress": job.progress,
         "error": job.error,
@@ -78,16 +83,14 @@ def _spec(services: Services, sid: str, body: IdentificationRequest) -> dict[str
     vehicle = services.store.session(sid).vehicle if body.vehicle is None else body.vehicle
     spec = body.model_dump(mode="json", exclude={"key", "runs", "vehicle"})
     spec["vehicle"] = vehicle_to_json(vehicle_from_json(vehicle))
-    spec["runs"] = [{"id": one.id, "name": one.name} for one in kept]
+    spec["runs"] = [{"id": one.id, "name": one.name, "noise": one.noise} for one in kept]
     if strangers := set(body.braking) - {one.id for one in kept}:
         raise InvalidRequest(
             f"Braking is marked for {min(strangers)}, which is not among the runs; leave it out or "
             "add the run.",
             field="braking",
         )
-    problem = build_problem(spec, marked_runs(spec, kept, services.recordings))
-    spec["names"] = [parameter.name for parameter in problem.free]
-    return spec
+    return filled_in(spec, build_problem(spec, marked_runs(spec, kept, services.recordings)))
 
 
 @router.get("")

@@ -125,6 +125,36 @@ def test_what_goes_to_the_worker_is_everything_it_needs(owner, clusters):
     assert "wheel.fl.z" in payload["runs"][0]
 
 
+def test_notes_that_come_while_a_job_waits_do_not_change_it(settings, clusters):
+    """Oracle: what was stated when it was asked for, which the job shows and the worker gets."""
+    with open_client(settings) as service:
+        owner = Visitor(service)
+        job = submit(owner)
+        notes = f"/measurements/{job['runs'][0]['id']}/notes?name=lap.toml"
+        changed = owner.put(notes, content=b'[noise]\n"chassis.z" = 0.02\n').json()["noise"]
+        assert job["runs"][0]["noise"] != changed
+    with open_client(settings) as service:
+        owner.client = service
+        until(lambda: job["id"] in clusters[-1].tasks)
+        _, payload, _ = clusters[-1].tasks[job["id"]]
+        assert payload["runs"][0].noise == job["runs"][0]["noise"]
+        assert owner.get("/identifications").json() == [job]
+        assert submit(owner)["runs"][0]["noise"] == changed
+
+
+def test_what_held_untold_is_shown_filled_in(owner, clusters):
+    """Oracle: the session's car and the default bounds that follow from its start values."""
+    free, held = "front.suspension.stiffness", "rear.suspension.stiffness"
+    job = submit(owner, free=["K_F"], start={"K_R": 2e4})
+    own = owner.get("/vehicle").json()["front"]["suspension"]["stiffness"]
+    bounds = owner.client.post("/api/parameters/bounds", json={"start": {free: own}}).json()
+    assert job["free"] == [free]
+    assert len(job["fixed"]) == 11
+    assert held in job["fixed"]
+    assert job["start"] == {free: own, held: 2e4}
+    assert job["bounds"] == bounds
+
+
 def test_a_job_runs_reports_and_ends_with_its_result(owner, clusters):
     job = submit(owner)["id"]
     until(lambda: job in clusters[-1].tasks)
