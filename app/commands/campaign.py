@@ -8,7 +8,7 @@ from ...engine.errors import SimulationError
 from ...engine.measurement import run_to_csv
 from ...engine.vehicle_file import reference_vehicles, vehicle_to_json
 from .inputs import read_noise
-from .output import make_folder, refuse_to_overwrite, write_file
+from .output import make_folder, refuse_input, refuse_to_overwrite, write_file
 
 
 def campaign(options: Namespace) -> None:
@@ -23,6 +23,8 @@ def campaign(options: Namespace) -> None:
     for run in runs:
         files[f"{run.name}.csv"] = run_to_csv(run)
         files[f"{run.name}.toml"] = notes(run)
+    for name in files:
+        refuse_input(folder / name, [options.noise])
     if not options.force:
         refuse_to_overwrite(folder / name for name in files)
     for name, text in files.items():

@@ -10,7 +10,7 @@ from ...engine.fit_file import fit_to_json
 from ...engine.identification import identify as fit_to_runs
 from ...engine.problem import Problem
 from .arguments import bounds, rims_settings, starts
-from .inputs import find_vehicle, read_noise, read_runs
+from .inputs import find_vehicle, read_noise, read_runs, recording_files
 from .output import (
     print_fit_percent,
     print_table,
@@ -23,7 +23,8 @@ from .output import (
 
 def identify(options: Namespace) -> None:
     """Fit the free parameters to all runs at once, print the report, write the fit."""
-    require_place(options.output, options.runs)
+    inputs = (options.vehicle, options.noise, *recording_files(options.runs))
+    require_place(options.output, inputs)
     noise = read_noise(options.noise)
     problem = Problem.build(
         find_vehicle(options.vehicle),

@@ -57,6 +57,11 @@ def read_runs(
     ]
 
 
+def recording_files(paths: Iterable[str]) -> list[Path]:
+    """All that `read_runs` reads: each recording, and where its notes are if it has any."""
+    return [one for path in map(Path, paths) for one in (path, path.parent / f"{path.stem}.toml")]
+
+
 def read_noise(path: str | None) -> Mapping[str, float]:
     """Standard deviations in SI by channel from a TOML file's [noise] table, if there is a file."""
     if path is None:

@@ -37,9 +37,9 @@ def write_file(path: str | Path, text: str) -> None:
         ) from error
 
 
-def require_place(path: str | Path | None, recordings: Iterable[str | Path] = ()) -> None:
+def require_place(path: str | Path | None, inputs: Iterable[str | Path | None]) -> None:
     """Refuse a place that no file can be written to, before hours of work are done for it, and one
-    of the recordings that the work is done from.
+    of the files that the work is done from; `inputs` as of `refuse_input`.
     """
     if path is None:
         return
@@ -50,14 +50,24 @@ def require_place(path: str | Path | None, recordings: Iterable[str | Path] = ()
         )
     if Path(path).is_dir():
         raise OutputError(f"{path}: this is a folder; name a file with -o.")
-    if Path(path).is_file() and any(Path(path).samefile(one) for one in _existing(recordings)):
-        raise OutputError(f"{path}: this is the recording itself; name another file with -o.")
+    refuse_input(path, inputs)
     if not os.access(folder, os.W_OK):
         raise OutputError(f"{path}: {folder} does not let you write; choose another with -o.")
 
 
-def _existing(paths: Iterable[str | Path]) -> list[Path]:
-    return [path for path in map(Path, paths) if path.exists()]
+def refuse_input(path: str | Path, inputs: Iterable[str | Path | None]) -> None:
+    """Refuse to write over one of the files that the command reads.
+
+    inputs : where they are, None and a key in place of a path are passed over
+    """
+    if not Path(path).is_file():
+        return
+    for one in filter(None, inputs):
+        if Path(one).exists() and Path(path).samefile(one):
+            raise OutputError(
+                f"{path}: this is {one} itself, which the command reads; choose another place"
+                " with -o."
+            )
 
 
 def make_folder(path: str | Path) -> Path:

@@ -16,7 +16,7 @@ from ...engine.simulation import (
     simulate_road,
 )
 from .arguments import rims_settings
-from .inputs import find_manoeuvre, find_vehicle, read_runs
+from .inputs import find_manoeuvre, find_vehicle, read_runs, recording_files
 from .output import print_fit_percent, print_warnings, require_place, write_file
 
 BELONGS_TO = {
@@ -43,7 +43,9 @@ def simulate(options: Namespace) -> None:
         raise SimulationError("--lift-off means nothing with --rims, where tyres play no part.")
     if not options.output and mode != "rims":
         raise SimulationError("Nothing says where the run goes; add -o run.csv.")
-    require_place(options.output, filter(None, (options.rims, options.posts)))
+    recordings = recording_files(filter(None, (options.rims, options.posts)))
+    inputs = (options.vehicle, options.manoeuvre, options.road, *recordings)
+    require_place(options.output, inputs)
     simulation = {"manoeuvre": _road, "rims": _rims, "posts": _posts}[mode](options)
     if simulation.fit_percent:
         print_fit_percent({simulation.run.name: simulation.fit_percent})

@@ -345,12 +345,40 @@ def test_what_a_shell_makes_of_an_unset_variable_is_refused(folder, capsys):
     assert not list(folder.iterdir())
 
 
-@pytest.mark.parametrize("command", ["identify", "simulate --rims"])
-def test_a_recording_is_not_written_over(folder, driven, capsys, command):
-    (folder / "run.csv").write_bytes(driven.read_bytes())
-    command = [*command.split(), "run.csv", "--vehicle", "paper", "-o", "./run.csv"]
-    assert "this is the recording itself" in refused(capsys, *command)
-    assert (folder / "run.csv").read_bytes() == driven.read_bytes()
+@pytest.mark.parametrize(
+    ("command", "place"),
+    [
+        ("identify run.csv --vehicle car.json", "run.csv"),
+        ("identify run.csv --vehicle car.json", "run.toml"),
+        ("identify run.csv --vehicle car.json", "car.json"),
+        ("identify run.csv --vehicle car.json --noise noise.toml", "noise.toml"),
+        ("simulate --vehicle car.json --rims run.csv", "run.csv"),
+        ("simulate --vehicle car.json --posts run.csv", "run.csv"),
+        ("simulate --vehicle car.json --manoeuvre bump", "car.json"),
+        ("simulate --vehicle car.json --manoeuvre short.json", "short.json"),
+        ("simulate --vehicle car.json --manoeuvre 1 --road road.csv", "road.csv"),
+    ],
+)
+def test_no_input_is_written_over(folder, capsys, command, place):
+    """Whatever way leads to it; refused before anything is read."""
+    write_vehicle(reference_vehicles()["paper"], "car.json")
+    for name in ("run.csv", "run.toml", "noise.toml", "short.json", "road.csv"):
+        (folder / name).write_text(f"an engineer's {name}")
+    kept = (folder / place).read_bytes()
+    (folder / "link").symlink_to(place)
+    for way in (place, f"./{place}", "link"):
+        message = refused(capsys, *command.split(), "-o", way)
+        assert f"ridetune: {way}: this is {place} itself" in message
+    assert (folder / place).read_bytes() == kept
+
+
+def test_campaign_does_not_write_over_its_noise_even_if_forced(folder, capsys):
+    """Oracle: the file as it was."""
+    (folder / "manoeuvre_1.toml").write_text('[noise]\n"chassis.z" = 0.001 # my sensor\n')
+    command = ["campaign", "--noise", "manoeuvre_1.toml", "--force", "-o", "."]
+    assert "this is manoeuvre_1.toml itself" in refused(capsys, *command)
+    assert "my sensor" in (folder / "manoeuvre_1.toml").read_text()
+    assert [path.name for path in folder.iterdir()] == ["manoeuvre_1.toml"]
 
 
 @pytest.mark.parametrize("place", ["missing/fit.json", "."])
