@@ -147,17 +147,12 @@ def channel_faults(
     return found
 
 
-def poor_fits(
-    runs: Sequence[ComparedRun],
-    fitted: Histories,
-    faults: Mapping[tuple[str, str], Sequence[str]],
-) -> list[str]:
-    """Sentences on channels followed badly for no fault already found."""
+def poor_fits(runs: Sequence[ComparedRun], fitted: Histories) -> list[str]:
+    """Sentences on channels followed badly."""
     found = (
         poor_fit(seen.name, channel, measured, fitted[seen.name][channel], seen.noise[channel])
         for seen in runs
         for channel, measured in seen.measured.items()
-        if (seen.name, channel) not in faults
     )
     return [sentence for sentence in found if sentence]
 

@@ -7,7 +7,7 @@ tells what the paper's campaign can and cannot determine.
 """
 
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, cast
 
@@ -162,12 +162,16 @@ def identify(
         *(warning for seen in problem.runs for warning in seen.inputs.warnings),
         *moved,
         *(sentence for sentences in faults.values() for sentence in sentences),
-        *poor_fits(driven, fitted, faults),
-        *_swings(problem, fitted, faults),
-        *hardly_moving(driven),
-        *bound_findings(estimates),
-        *(undetermined_findings(estimates, errors) if converged else []),
     ]
+    if not wrong:  # what else a wrong channel has bent is no news
+        warnings += [
+            *poor_fits(problem.runs, fitted),
+            *_swings(problem, fitted),
+            *hardly_moving(problem.runs),
+            *bound_findings(estimates),
+        ]
+    if converged:
+        warnings += undetermined_findings(estimates, errors)
     return Fit(
         vehicle=problem.vehicle_at(solution.x),
         parameters=estimates,
@@ -227,15 +231,13 @@ def _usable_start(residuals: Residuals, x: Array) -> tuple[Array, list[str]]:
     raise ProblemError(_failure(residuals.problem))
 
 
-def _swings(problem: Problem, fitted: Histories, faults: Collection[tuple[str, str]]) -> list[str]:
+def _swings(problem: Problem, fitted: Histories) -> list[str]:
     """Sentences on runs that start away from the equilibrium in which the model starts."""
     if problem.settings.initial_state == "measured":
         return []
-    accused = {run for run, _ in faults}
     return [
         sentence
-        for seen in _well_driven(problem)
-        if seen.name not in accused
+        for seen in problem.runs
         for sentence in swings_in(seen.name, seen.inputs.time, seen.measured, fitted[seen.name])
     ]
 
