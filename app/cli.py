@@ -63,6 +63,28 @@ def command_line() -> "Parser":
     return parser
 
 
+class Once(argparse.Action):
+    """Store what is given, and refuse a second one, which would win in silence.
+
+    It remembers being used, so a parser serves one command line.
+    """
+
+    used = False
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        """Take the value of one use."""
+        if self.used:
+            parser.error(f"{option_string} is given twice; give it once")
+        self.used = True
+        setattr(namespace, self.dest, values)
+
+
 class Parser(argparse.ArgumentParser):
     """An argument parser that complains in one line and suggests the nearest name."""
 
@@ -70,29 +92,24 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **settings: Any):
         super().__init__(allow_abbrev=False, **settings)
+        self.register("action", None, Once)
         # No option begins with a digit, so whatever does after a minus is a value: -1:2 too.
         self._negative_number_matcher = re.compile(r"-\.?\d")
 
     def refuse_unknown(self, arguments: Sequence[str]) -> None:
         """Refuse a misspelt command or option before anything else is found missing.
 
-        Also what a shell makes of an unset variable, and an option whose last use would win.
+        Also what a shell makes of an unset variable.
         """
-        given = set()
         for text in arguments:
             if text == "--":
                 break
             name, equals, value = text.partition("=")
             if not text or (name.startswith("--") and equals and not value):
                 self.error(f"{name or 'an argument'} is empty; give it a value or leave it out")
-            action = self._option_string_actions.get(name)
-            if name.startswith("--") and action is None:
+            if name.startswith("--") and name not in self._option_string_actions:
                 known = [text for text in self._option_string_actions if text.startswith("--")]
                 self.error(f"there is no option {name} ({_near(name, known)})")
-            if action is not None and action.nargs != "+":
-                if action.dest in given:
-                    self.error(f"{name} is given twice; give it once")
-                given.add(action.dest)
             if not name.startswith("-") and self.commands:
                 if name not in self.commands:
                     self.error(f"there is no command {name!r} ({_near(name, self.commands)})")
