@@ -17,19 +17,18 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from ..engine.rims_settings import (
-    LONGEST_STEP,
-    LOWEST_CUTOFF,
-    SHORTEST_STEP,
-    InitialState,
-    RimsSettings,
-)
+from ..engine import rims_settings
+from ..engine.rims_settings import LOWEST_CUTOFF, InitialState, RimsSettings
+from ..engine.step_limits import LONGEST_SAMPLE_STEP, LONGEST_STEP, SHORTEST_STEP
 
 JsonObject = Mapping[str, Any]
 Name = Annotated[str, StringConstraints(min_length=1, max_length=100)]
 Names = Annotated[list[Name], Field(max_length=200)]
 Traction = Literal["exact", "paper"]
 Cutoff = Annotated[FiniteFloat, Field(ge=LOWEST_CUTOFF)] | None
+RimsStep = Annotated[
+    FiniteFloat, Field(ge=rims_settings.SHORTEST_STEP, le=rims_settings.LONGEST_STEP)
+]
 Intervals = Annotated[list[tuple[FiniteFloat, FiniteFloat]], Field(max_length=100)]
 RIMS = RimsSettings()
 
@@ -57,7 +56,7 @@ class RimsSettingsForm(WireForm):
     rim_cutoff_hz: Cutoff = RIMS.rim_cutoff_hz
     output_cutoff_hz: Cutoff = RIMS.output_cutoff_hz
     initial_state: InitialState = RIMS.initial_state
-    step: Annotated[FiniteFloat, Field(ge=SHORTEST_STEP, le=LONGEST_STEP)] = RIMS.step
+    step: RimsStep = RIMS.step
 
     def settings(self) -> RimsSettings:
         """The engine's settings."""
@@ -97,8 +96,10 @@ class SimulationRequest(WireForm):
     road: JsonObject | None = None
     model: Literal["8dof", "7dof"] = "8dof"
     lift_off: bool = False
-    step: Annotated[FiniteFloat, Field(ge=1e-4, le=0.01)] | None = None
-    sample_step: Annotated[FiniteFloat, Field(ge=5e-4, le=0.1)] | None = None
+    step: Annotated[FiniteFloat, Field(ge=SHORTEST_STEP, le=LONGEST_STEP)] | None = None
+    sample_step: Annotated[FiniteFloat, Field(ge=SHORTEST_STEP, le=LONGEST_SAMPLE_STEP)] | None = (
+        None
+    )
     channels: Names | None = None
     max_samples: Annotated[int, Field(ge=2, le=2_000_000)] | None = None
     decimate: Literal["extremes", "stride"] = "extremes"

@@ -15,9 +15,7 @@ from scipy.interpolate import CubicSpline
 from .demand import Demand
 from .errors import SimulationError
 from .road import Road
-
-SHORTEST_STEP, LONGEST_STEP = 1e-5, 0.02
-"""Accepted integration steps, s: below, rounding and patience suffer; above, wheel hop does."""
+from .step_limits import LONGEST_SAMPLE_STEP, LONGEST_STEP, SHORTEST_STEP
 
 MOST_MEMORY = 1e9
 """Refused above: bytes of everything that is kept of one car's steps and samples."""
@@ -57,7 +55,7 @@ def prepare_free(demand: Demand, step: float, sample_step: float) -> FreeInputs:
     Raises SimulationError for a step, a sampling or an amount of memory outside what is accepted.
     """
     _check_number("step", step, SHORTEST_STEP, LONGEST_STEP)
-    _check_number("sample_step", sample_step, SHORTEST_STEP, 1.0)
+    _check_number("sample_step", sample_step, SHORTEST_STEP, LONGEST_SAMPLE_STEP)
     if not (math.isfinite(demand.duration) and demand.duration >= sample_step):
         raise SimulationError(
             f"duration is {demand.duration} s; it must cover at least one sample step of"

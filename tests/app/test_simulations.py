@@ -2,6 +2,7 @@
 
 import threading
 import time
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,8 @@ from numpy.testing import assert_allclose
 from ridetune.app.main import create_app
 from ridetune.app.settings import Settings
 from ridetune.app.warmup import WarmUp
-from ridetune.engine.manoeuvre import reference_manoeuvres
+from ridetune.engine.errors import SimulationError
+from ridetune.engine.manoeuvre import manoeuvre_from_json, reference_manoeuvres
 from ridetune.engine.measurement import read_run
 from ridetune.engine.rims_settings import RimsSettings
 from ridetune.engine.simulation import simulate_rims, simulate_road
@@ -175,6 +177,27 @@ def test_what_cannot_be_simulated_is_refused_with_a_sentence(driver, name):
     assert reply.status_code == status, reply.text
     assert said in reply.json()["detail"]
     assert reply.json()["detail"][-1] in ".?"
+
+
+@pytest.mark.parametrize(
+    ("steps", "taken"),
+    [
+        ({"step": 1e-5}, True),
+        ({"step": 0.9e-5}, False),
+        ({"step": 0.02, "sample_step": 0.02}, True),
+        ({"step": 0.021, "sample_step": 0.02}, False),
+        ({"sample_step": 1.0}, True),
+        ({"sample_step": 1.1}, False),
+        ({"sample_step": 0.9e-5}, False),
+    ],
+)
+def test_the_service_takes_the_steps_that_the_engine_takes(driver, steps, taken):
+    """Oracle: the engine called directly."""
+    still = {"name": "still", "kind": "road", "duration": 1.5}
+    reply = driver.post("/simulations", json={"manoeuvre": still, "max_samples": 2, **steps})
+    assert reply.status_code == (200 if taken else 422), reply.text
+    with nullcontext() if taken else pytest.raises(SimulationError, match="s; give one between"):
+        simulate_road(reference_vehicles()["paper"], manoeuvre_from_json(still), **steps)
 
 
 MEANS_NOTHING = {
