@@ -26,7 +26,10 @@ class StrictRoute(APIRoute):
         handler = super().get_route_handler()
 
         async def strict(request: Request) -> Response:
-            return await handler(StrictRequest(request.scope, request.receive))
+            request = StrictRequest(request.scope, request.receive)
+            if self.body_field is not None and not await request.body():
+                raise HTTPException(400, "The body is empty; send JSON.")
+            return await handler(request)
 
         return strict
 

@@ -22,11 +22,11 @@ UNREADABLE = {
     "key twice": b'{"seq": 1, "seq": 2}',
     "cut off": b'{"seq": 1',
     "blank": b" ",
+    "empty": b"",
 }
 UNFIT = {
     "denormal step": b'{"step": 5e-324}',
     "integer beyond float": b'{"step": ' + b"9" * 25 + b"}",
-    "empty": b"",
     "a list": b"[]",
     "a string": b'"manoeuvre"',
     "unknown field": b'{"modell": "8dof"}',
@@ -70,6 +70,7 @@ def test_a_hostile_body_is_refused_with_a_sentence(patient, name, path):
         (b'{"seq": 1, "seq": 2}', "twice"),
         (b'{"manoeuvre": ' + b"[" * 41 + b"]" * 41 + b"}", "40 levels"),
         (b'{"seq": 1', "character 9"),
+        (b"", "body is empty"),
         (b'{"modell": "8dof"}', "field modell is not known"),
         (b'{"rims": {}}', "field rims.measurement is missing"),
     ],
