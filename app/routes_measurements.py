@@ -3,7 +3,7 @@
 from datetime import UTC, datetime
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.responses import FileResponse
 from starlette.concurrency import run_in_threadpool
 
@@ -17,11 +17,14 @@ from .routes_simulations import FORMS, csv_reply, frames_reply
 from .services import Services, Shared
 from .store import Measurement, NewMeasurement
 from .strict_json import StrictRoute
-from .uploads import Received, Upload, openapi
+from .uploads import Upload, openapi, receive
 
 router = APIRouter(
     prefix="/api/sessions/{sid}/measurements", tags=["measurements"], route_class=StrictRoute
 )
+
+Recording = Annotated[Upload, Depends(receive("measurement.csv"))]
+Notes = Annotated[Upload, Depends(receive("notes.toml"))]
 
 
 def measurement_to_json(kept: Measurement) -> dict[str, Any]:
@@ -39,7 +42,7 @@ def measurement_to_json(kept: Measurement) -> dict[str, Any]:
 
 
 @router.post("", status_code=201, openapi_extra=openapi("text/csv"))
-async def upload(sid: SessionId, services: Shared, received: Received) -> dict[str, Any]:
+async def upload(sid: SessionId, services: Shared, received: Recording) -> dict[str, Any]:
     """Upload a recording: a form with the part `file`, or the bare file with ?name=."""
     async with services.parsing:
         kept = await run_in_threadpool(_keep, services, sid, received)
@@ -100,9 +103,7 @@ def original(sid: SessionId, mid: str, services: Shared) -> FileResponse:
 
 
 @router.put("/{mid}/notes", openapi_extra=openapi("application/toml"))
-async def set_notes(
-    sid: SessionId, mid: str, services: Shared, received: Received
-) -> dict[str, Any]:
+async def set_notes(sid: SessionId, mid: str, services: Shared, received: Notes) -> dict[str, Any]:
     """Take a recording's noise from a NAME.toml, as the file beside it would state it."""
     kept = services.store.measurement(sid, mid)
     async with services.parsing:

@@ -1,11 +1,11 @@
 """An upload on its way in: a form's file or the bare body, to the bytes and a harmless name."""
 
 import re
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from tempfile import SpooledTemporaryFile
-from typing import Annotated, Any, BinaryIO, cast
+from typing import Any, BinaryIO, cast
 
-from fastapi import Depends, Request
+from fastapi import Request
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import UploadFile
 
@@ -42,28 +42,30 @@ class Upload:
         return data
 
 
-async def _received(request: Request, name: str = "") -> AsyncIterator[Upload]:
-    """The one file of a request; the counting of its bytes is the guard's."""
-    if request.headers.get("content-type", "").lower().startswith("multipart/form-data"):
-        async with request.form(max_files=1, max_fields=5) as form:
-            file = form.get("file")
-            if not isinstance(file, UploadFile):
-                raise InvalidRequest(
-                    'The form has no file; send it in a part called "file".', field="file"
-                )
-            yield Upload(harmless(name or file.filename or ""), file.file)
-        return
-    with SpooledTemporaryFile(max_size=IN_MEMORY) as file:
-        async for chunk in request.stream():
-            await run_in_threadpool(file.write, chunk)
-        yield Upload(harmless(name), cast(BinaryIO, file))
+def receive(untold: str) -> Callable[..., AsyncIterator[Upload]]:
+    """The dependency that takes the one file of a request, called `untold` unless it has a name."""
+
+    async def received(request: Request, name: str = "") -> AsyncIterator[Upload]:
+        # The counting of its bytes is the guard's.
+        if request.headers.get("content-type", "").lower().startswith("multipart/form-data"):
+            async with request.form(max_files=1, max_fields=5) as form:
+                file = form.get("file")
+                if not isinstance(file, UploadFile):
+                    raise InvalidRequest(
+                        'The form has no file; send it in a part called "file".', field="file"
+                    )
+                yield Upload(harmless(name or file.filename or "") or untold, file.file)
+            return
+        with SpooledTemporaryFile(max_size=IN_MEMORY) as file:
+            async for chunk in request.stream():
+                await run_in_threadpool(file.write, chunk)
+            yield Upload(harmless(name) or untold, cast(BinaryIO, file))
+
+    return received
 
 
 def harmless(name: str) -> str:
-    """The last part of a path, without control characters, of bounded length."""
+    """The last part of a path, without control characters, of bounded length; perhaps nothing."""
     last = re.split(r"[/\\]", name)[-1]
     plain = re.sub(r"[\x00-\x1f\x7f-\x9f\ud800-\udfff]", "", last).strip(" .")
-    return plain[-LONGEST_NAME:] or "measurement.csv"
-
-
-Received = Annotated[Upload, Depends(_received)]
+    return plain[-LONGEST_NAME:]

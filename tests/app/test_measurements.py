@@ -110,6 +110,8 @@ def test_notes_that_say_nothing_usable_are_refused(visitor, notes, said):
     assert said in reply.json()["detail"]
     assert visitor.get(f"/measurements/{kept['id']}").json() == kept
     assert visitor.put("/measurements/none/notes", content=notes).status_code == 404
+    nameless = visitor.put(f"/measurements/{kept['id']}/notes", content=notes).json()["detail"]
+    assert nameless == reply.json()["detail"].replace("lap.toml", "notes.toml")
 
 
 BAD_FILES = {
