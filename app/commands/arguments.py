@@ -65,9 +65,9 @@ def braking(marks: Iterable[str], paths: Sequence[str]) -> dict[int, tuple[Inter
     """
     marked: dict[int, list[str]] = {}
     for mark in marks:
-        name, _, text = mark.rpartition("=")
-        marked.setdefault(_place(name, paths, mark), []).append(text)
-    return {place: _intervals(texts, paths[place]) for place, texts in marked.items()}
+        name = mark.rpartition("=")[0]
+        marked.setdefault(_place(name, paths, mark), []).append(mark)
+    return {place: _intervals(of_run, paths[place]) for place, of_run in marked.items()}
 
 
 def _place(name: str, paths: Sequence[str], mark: str) -> int:
@@ -90,10 +90,14 @@ def _place(name: str, paths: Sequence[str], mark: str) -> int:
     return called[0]
 
 
-def _intervals(texts: Sequence[str], path: str) -> tuple[Interval, ...]:
+def _intervals(marks: Sequence[str], path: str) -> tuple[Interval, ...]:
     """All that is marked in one run."""
+    texts = [mark.rpartition("=")[2] for mark in marks]
     if "none" not in texts:
-        return tuple(_two_numbers(text, f"--braking {path}={text}", INTERVAL) for text in texts)
+        return tuple(
+            _two_numbers(text, f"--braking {mark}", INTERVAL)
+            for text, mark in zip(texts, marks, strict=True)
+        )
     if set(texts) != {"none"}:
         raise ArgumentError(
             f"--braking marks {path} with none and with an interval; leave out one of them."
