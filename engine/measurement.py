@@ -57,7 +57,7 @@ def read_run(path: str | Path, *, noise: Mapping[str, float] | None = None) -> R
     noise : standard deviations in SI by channel; they go before those of the notes
     """
     path = Path(path)
-    beside = path.with_suffix(".toml")
+    beside = path.parent / f"{path.stem}.toml"
     notes = read_notes(beside) if beside.is_file() else RunNotes()
     try:
         with path.open("rb") as stream:

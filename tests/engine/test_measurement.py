@@ -269,8 +269,9 @@ def test_a_file_too_large_is_refused_unread(monkeypatch):
 def test_a_file_that_is_not_there_is_named(tmp_path):
     with pytest.raises(MeasurementError, match=r"nowhere\.csv: the file cannot be read .*path"):
         read_run(tmp_path / "nowhere.csv")
-    with pytest.raises(MeasurementError, match="cannot be read"):
-        read_run(tmp_path)
+    for folder in (tmp_path, ".", "/"):
+        with pytest.raises(MeasurementError, match="cannot be read"):
+            read_run(folder)
 
 
 # --- magnitudes -------------------------------------------------------------------------------
