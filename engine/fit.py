@@ -32,15 +32,17 @@ class Outcome(StrEnum):
         "measure more."
     )
     DOUBTFUL = (
-        "The fit ended, but a channel is probably wrong (its sign, its unit, its column or a dead "
-        "sensor), so nothing is determined; mend it as the warnings say and fit again."
+        "The fit ended, but a channel is probably wrong (its sign, its unit, its column, spikes or "
+        "a dead sensor) or the car lacks its brakes, so nothing is determined; mend it as the "
+        "warnings say and fit again."
     )
     ASTRAY = (
         "The fit ended further from the measurement than the measurement's own mean; check signs "
         "and units of the channels, the car's known data and the start values."
     )
     BUDGET_SPENT = (
-        "The fit ran out of evaluations before it converged; allow more or free fewer parameters."
+        "The fit ran out of evaluations before it converged; begin another from its values, or "
+        "free fewer parameters."
     )
     STUCK = (
         "The fit stopped because the model fails for most cars around it; choose other start "

@@ -9,11 +9,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import medfilt
 
 from .fit import ParameterEstimate
 from .problem import ComparedRun
 from .simulation import fit_percent
+from .spikes import despiked
 from .uncertainty import Uncertainty
 
 Array = NDArray[np.float64]
@@ -32,11 +32,11 @@ EXCHANGED = {
 ALIKE = 5.0
 """Factor between measured and model amplitude up to which their signs are compared."""
 
-DESPIKED = 5
-"""Samples of the running median before amplitudes are compared; two spikes in a row lie outside."""
-
 STANDING = {"chassis.z": 0.1, "chassis.pitch": 0.06, "chassis.roll": 0.06}
 """Standard deviation (m, rad) beyond which a model has fallen over and is no witness."""
+
+LEAST_MOTION = 1e-4
+"""Share of it below which a model does not move: 10 um, or 0.3 thousandths of a degree."""
 
 POOR_FIT = 50.0
 """Fit percent below which a channel is reported, unless noise alone explains it."""
@@ -69,10 +69,9 @@ def correlation(measured: Array, model: Array) -> float:
 
 def _amplitude_ratio(channel: str, measured: Array, model: Array) -> float:
     """Measured over model amplitude; 0 for a model that never moves or has fallen over."""
-    measured_amplitude, amplitude = (
-        float(np.std(medfilt(one, DESPIKED))) for one in (measured, model)
-    )
-    return measured_amplitude / amplitude if 0.0 < amplitude < STANDING[channel] else 0.0
+    of_measured, of_model = (float(np.std(despiked(one))) for one in (measured, model))
+    moves = LEAST_MOTION * STANDING[channel] < of_model < STANDING[channel]
+    return of_measured / of_model if moves else 0.0
 
 
 def wrong_sign(run: str, channel: str, measured: Array, start: Array, fitted: Array) -> str | None:

@@ -238,6 +238,7 @@ def _swings(problem: Problem, fitted: Histories) -> list[str]:
     return [
         sentence
         for seen in problem.runs
+        if not seen.inputs.stands
         for sentence in swings_in(seen.name, seen.inputs.time, seen.measured, fitted[seen.name])
     ]
 

@@ -28,6 +28,7 @@ from .channels import (
 from .csv_table import LARGEST_FILE, CsvTable, is_number, split_title
 from .errors import MeasurementError
 from .run_notes import RunNotes, checked_noise, doubtful_noise, read_notes
+from .spikes import spikes
 from .units import UnitError, to_si
 
 FEWEST_SAMPLES = 10
@@ -35,9 +36,6 @@ FEWEST_SAMPLES = 10
 
 COARSEST_STEP = 0.2
 """Time between samples, s, from which on the unit of time is doubtful."""
-
-LONGEST_SPIKE = 3
-"""Samples in a row up to which values too great to be true are a spike, not a wrong unit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,15 +241,12 @@ def _doubtful_magnitude(
     column: _Column, time: NDArray[np.float64], values: NDArray[np.float64]
 ) -> list[str]:
     """A warning when a channel's greatest value makes its stated unit, or itself, doubtful."""
-    info, peak = column.info, float(np.max(np.abs(values)))
+    info = column.info
+    if found := spikes(info, time, values):
+        return found
+    peak = float(np.max(np.abs(values)))
     shown = f"{peak / column.factor:.4g} {column.unit or info.unit}"
-    beyond = np.flatnonzero(np.abs(values) > info.largest)
-    if beyond.size and _stand_alone(beyond, values):
-        return [
-            f"{info.name} jumps to {shown}, which no car does, for {beyond.size} of {values.size} "
-            f"samples from {time[beyond[0]]:.4g} s on; repair or cut these spikes."
-        ]
-    if beyond.size:
+    if peak > info.largest:
         smaller = to_si(info.display_unit, info.unit)[0] < column.factor
         doubt = f"is it in {info.display_unit}?" if smaller else "check its unit and rest value."
         return [f"{info.name} reaches {shown}; {doubt}"]
@@ -259,14 +254,3 @@ def _doubtful_magnitude(
         doubt = f"is it in {info.unit}?" if column.factor < 1.0 else "check its unit."
         return [f"{info.name} stays within {shown}; {doubt}"]
     return []
-
-
-def _stand_alone(beyond: NDArray[np.int64], values: NDArray[np.float64]) -> bool:
-    """Whether all samples of great value are spikes: few in a row, above their neighbours."""
-    sizes = np.pad(np.abs(values), 1)
-    groups = np.split(beyond, np.flatnonzero(np.diff(beyond) > 1) + 1)
-    return all(
-        len(group) <= LONGEST_SPIKE
-        and max(sizes[group[0]], sizes[group[-1] + 2]) < 0.5 * np.max(sizes[group + 1])
-        for group in groups
-    )

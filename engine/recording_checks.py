@@ -8,10 +8,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .channels import Run, channel
+from .channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, Run, channel
 from .filters import low_pass, too_coarse
 from .frames import CORNERS, GRAVITY
+from .spikes import spikes
+from .vehicle import Vehicle
 from .wheel_order import exchanged_wheels
 
 REST_WINDOW = 0.5
@@ -66,13 +69,18 @@ class Finding(NamedTuple):
     fault: bool
 
 
-def check_recording(run: Run, wheelbase: float) -> list[Finding]:
-    """Findings about one run that has the channels of the rims mode, of a car of a wheelbase, m."""
+def check_recording(run: Run, vehicle: Vehicle) -> list[Finding]:
+    """Findings about one run that has the channels of the rims mode."""
     return [
-        *(Finding(sentence, False) for sentence in (*_gaps(run), *_rest_values(run))),
+        *(Finding(sentence, False) for sentence in (*_gaps(run), *_rest_values(run, vehicle))),
+        *(
+            Finding(sentence, True)
+            for name in INPUT_CHANNELS
+            for sentence in spikes(channel(name), run.time, run[name])
+        ),
         *_acceleration_against_speed(run),
         *(Finding(sentence, True) for sentence in _one_wheel_turned_over(run)),
-        *(Finding(sentence, True) for sentence in exchanged_wheels(run, wheelbase)),
+        *(Finding(sentence, True) for sentence in exchanged_wheels(run, vehicle.wheelbase)),
     ]
 
 
@@ -87,28 +95,53 @@ def _gaps(run: Run) -> list[str]:
     ]
 
 
-def _rest_values(run: Run) -> list[str]:
-    """Channels that do not read zero while the car stands at the start of the record.
+def stands(run: Run) -> bool:
+    """Whether the car stands at the start of the record, neither a wheel nor a_x moving.
 
-    The car stands when its speed, if recorded, stays near zero and neither a wheel nor a_x moves.
+    A speed that is recorded stays near zero.
     """
-    start = run.time - run.time[0] <= REST_WINDOW
+    start = _start(run)
     rolling = "chassis.v_x" in run and bool(np.any(np.abs(run["chassis.v_x"][start]) > STILL))
-    shaken = any(np.std(run[name][start]) > REST_LIMITS[name] for name in STILL_CHANNELS)
-    if rolling or shaken:
+    return not rolling and all(
+        np.std(run[name][start]) <= REST_LIMITS[name] for name in STILL_CHANNELS
+    )
+
+
+def _start(run: Run) -> NDArray[np.bool_]:
+    return run.time - run.time[0] <= REST_WINDOW
+
+
+def _rest_values(run: Run, vehicle: Vehicle) -> list[str]:
+    """Channels of a standing car that do not read what its wheels put them at, and a_x not zero."""
+    if not stands(run):
         return []
+    start = _start(run)
+    on_wheels = _plane(vehicle, [np.mean(run[name][start]) for name in WHEEL_CHANNELS])
+    expected = dict(zip(OUTPUT_CHANNELS, on_wheels, strict=True)) | {"chassis.a_x": 0.0}
     readings = []
-    for name, limit in REST_LIMITS.items():
-        rest = float(np.mean(run[name][start])) if name in run else 0.0
-        if abs(rest) > limit:
+    for name, value in expected.items():
+        rest = float(np.mean(run[name][start])) if name in run else value
+        if abs(rest - value) > REST_LIMITS[name]:
             shown = channel(name)
-            readings.append(f"{name} {shown.display_factor * rest:.3g} {shown.display_unit}")
+            read, put = (f"{shown.display_factor * one:.3g}" for one in (rest, value))
+            readings.append(f"{name} reads {read} instead of {put} {shown.display_unit}")
     if not readings:
         return []
     return [
-        f"Run {run.name} starts at rest, yet there it reads {', '.join(readings)}; the model "
-        "counts from rest, so subtract the rest value."
+        f"Run {run.name} starts at rest on its wheels, yet there {', '.join(readings)}; the model "
+        "counts from rest, so subtract the rest values of the body and of the wheels."
     ]
+
+
+def _plane(vehicle: Vehicle, heights: list[np.floating]) -> list[float]:
+    """z, pitch and roll of a rigid body that lies nearest to four wheel centres' heights, m."""
+    front, rear = vehicle.front, vehicle.rear
+    rows = [
+        [1.0, -x, side * 0.5 * axle.track]
+        for axle, x in ((front, front.cg_distance), (rear, -rear.cg_distance))
+        for side in (1.0, -1.0)
+    ]
+    return np.linalg.lstsq(np.array(rows), np.array(heights), rcond=None)[0].tolist()
 
 
 def _acceleration_against_speed(run: Run) -> list[Finding]:

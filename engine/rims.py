@@ -30,7 +30,7 @@ from .demand import rolling_resistance
 from .errors import MeasurementError
 from .filters import is_uniform, smoothed, too_coarse
 from .initial_state import measured_state
-from .recording_checks import check_recording
+from .recording_checks import check_recording, stands
 from .rims_settings import RimsSettings
 from .vehicle import Vehicle
 
@@ -65,6 +65,7 @@ class RimsInputs:
     sample_fraction : (samples,) where in that step, 0 to 1
     on_nodes : whether every sample coincides with a node
     braking : (begin, end) where the car is taken to brake, s
+    stands : whether it stands at the start
     warnings : sentences about the recording
     faults : those of them that say that what drives the model is wrong
     """
@@ -78,6 +79,7 @@ class RimsInputs:
     sample_fraction: Array
     on_nodes: bool
     braking: tuple[Interval, ...] = ()
+    stands: bool = False
     warnings: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()
 
@@ -113,7 +115,7 @@ def prepare(run: Run, vehicle: Vehicle, settings: RimsSettings | None = None) ->
     """Inputs of the rims mode for one run.
 
     The vehicle matters for the braking weight (its brakes and rolling resistance) and for the order
-    of the wheels (its wheelbase).
+    of the wheels (its wheelbase) and the rest of the body on them (its tracks).
     Raises MeasurementError when a channel is missing, the run is too short or braking is marked
     outside it, VehicleError when braking is marked for a vehicle without brakes.
     """
@@ -130,7 +132,7 @@ def prepare(run: Run, vehicle: Vehicle, settings: RimsSettings | None = None) ->
     speed, unknown_start = _speed(run, acceleration)
     intervals, unbraked = braking_of(run, a_x, vehicle, rolling_resistance(vehicle))
     measured = settings.initial_state == "measured"
-    findings = check_recording(run, vehicle.wheelbase)
+    findings = check_recording(run, vehicle)
     warnings = [
         *run.warnings,
         *_sampling_warnings(run, settings),
@@ -160,8 +162,9 @@ def prepare(run: Run, vehicle: Vehicle, settings: RimsSettings | None = None) ->
         sample_fraction=fraction,
         on_nodes=bool(np.all(np.minimum(fraction, 1.0 - fraction) < 1e-6)),
         braking=tuple(intervals),
-        warnings=tuple(warnings),
-        faults=tuple(finding.sentence for finding in findings if finding.fault),
+        stands=stands(run),
+        warnings=tuple(dict.fromkeys(warnings)),
+        faults=(*(finding.sentence for finding in findings if finding.fault), *unbraked),
     )
 
 

@@ -168,7 +168,7 @@ def simulate_rims(
         _load_shares(result),
         inputs.node_time.size - 1,
         _fit_percent(result, run, settings),
-        (*inputs.warnings, *ignored, *_swing(result, run, model, settings)),
+        (*inputs.warnings, *ignored, *_swing(result, run, inputs, model, settings)),
     )
 
 
@@ -347,8 +347,12 @@ def _fit_percent(simulated: Run, measured: Run, settings: RimsSettings) -> dict[
     return scores
 
 
-def _swing(simulated: Run, measured: Run, model: Model, settings: RimsSettings) -> list[str]:
+def _swing(
+    simulated: Run, measured: Run, inputs: RimsInputs, model: Model, settings: RimsSettings
+) -> list[str]:
     """A sentence where the record starts away from the equilibrium in which the model starts."""
+    if inputs.stands:
+        return []
     name, time, cutoff = measured.name, measured.time, settings.output_cutoff_hz
     recorded, followed = (filtered_outputs(run, cutoff) for run in (measured, simulated))
     if model == "7dof":

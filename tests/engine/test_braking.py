@@ -46,7 +46,11 @@ def test_a_braking_car_needs_brakes_to_brake_with():
     assert prepare(run, BRAKED).stage_inputs[:, :, 14].max() == 1.0
     without = prepare(run, CAR)
     assert without.stage_inputs[:, :, 14].max() == 0.0
-    assert "no brakes" in " ".join(without.warnings)
+    [fault] = without.faults
+    assert "no brakes" in fault
+    assert fault in without.warnings
+    assert not prepare(run, BRAKED).faults
+    assert not prepare(replace(run, braking=()), CAR).faults
 
 
 def test_marked_braking_goes_before_what_a_x_shows():

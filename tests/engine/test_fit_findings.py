@@ -64,6 +64,12 @@ def test_a_car_that_stands_most_of_the_time_has_no_mistaken_unit():
     assert "multiply it by -1" in wrong_sign("lap", "chassis.z", -noisy, bump, bump)
 
 
+def test_a_channel_at_rest_in_the_model_has_no_unit_to_mistake():
+    """Roll on a flat road is rounding, in the record as in the model."""
+    rounding = 1e-17 * np.cos(40.0 * TIME)
+    assert wrong_unit("lap", "chassis.roll", 0.03 * rounding, rounding) is None
+
+
 def test_a_model_that_has_fallen_over_is_no_witness():
     """A car on its nose by 0.3 rad looks like degrees taken for radians, the other way round."""
     fallen = 0.3 * np.tanh(TIME - 8.0)

@@ -98,6 +98,14 @@ def test_the_linear_model_cannot_take_a_start_as_measured():
         assert "take the initial state" not in sentence
 
 
+def test_a_standing_car_with_a_rest_value_does_not_start_in_motion():
+    run = driven("2")
+    offset = replace(run, channels={**run.channels, "chassis.z": run["chassis.z"] + 0.01})
+    warnings = simulate_rims(CAR, offset).warnings
+    assert not told(warnings)
+    assert [one for one in warnings if "chassis.z reads 10 instead of" in one]
+
+
 def test_a_fit_tells_of_a_run_cut_out_of_a_ride():
     ride = cut(driven("2"), 6.0)
     for settings, sentences in ((RimsSettings(), 1), (RimsSettings(initial_state="measured"), 0)):

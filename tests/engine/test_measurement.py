@@ -314,8 +314,8 @@ def test_a_spike_is_named_with_its_place_and_not_taken_for_a_unit():
     values = 0.01 * np.sin(time)
     values[640] = 5.0
     [warning] = parse({"time [s]": time, "chassis.z [m]": values}).warnings
-    assert "chassis.z jumps to 5 m" in warning
-    assert "for 1 of 2001 samples from 3.2 s on" in warning
+    assert "chassis.z jumps to 5000 mm" in warning
+    assert "in 1 of 2001 samples from 3.2 s on" in warning
 
 
 @pytest.mark.parametrize(

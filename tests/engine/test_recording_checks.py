@@ -3,6 +3,10 @@ import pytest
 from ridetune.engine.channels import INPUT_CHANNELS, Run
 from ridetune.engine.recording_checks import check_recording
 
+from ..factories import paper_vehicle
+
+CAR = paper_vehicle()
+
 TIME = np.arange(0.0, 10.0, 0.005)
 PULL_AWAY = np.where((TIME > 2.0) & (TIME < 6.0), 2.0, 0.0)
 SPEED = 2.0 * np.clip(TIME - 2.0, 0.0, 4.0)
@@ -14,7 +18,7 @@ def run(time=TIME, **changed):
 
 
 def findings(recording):
-    return check_recording(recording, 2.6)
+    return check_recording(recording, CAR)
 
 
 def test_a_clean_recording_gives_no_finding():
@@ -24,9 +28,29 @@ def test_a_clean_recording_gives_no_finding():
 def test_rest_values_are_named_with_their_size():
     [finding] = findings(run(**{"chassis.z": 0.012 + 0 * TIME, "wheel.rr.z": -0.03 + 0 * TIME}))
     assert "lap" in finding.sentence
-    assert "chassis.z 12 mm" in finding.sentence
-    assert "wheel.rr.z -30 mm" in finding.sentence
+    assert "chassis.z reads 12 instead of -7.3" in finding.sentence
     assert not finding.fault
+
+
+def test_a_car_that_stands_on_uneven_ground_has_no_rest_value():
+    """Oracle: a rigid car on four wheels, the front ones 20 mm higher than the rear ones."""
+    front = 0.02 + 0 * TIME
+    nose_up = -0.02 / CAR.wheelbase
+    body = {"chassis.z": -nose_up * CAR.rear.cg_distance, "chassis.pitch": nose_up}
+    uneven = {"wheel.fl.z": front, "wheel.fr.z": front}
+    recorded = {name: value + 0 * TIME for name, value in body.items()}
+    assert findings(run(**uneven, **recorded)) == []
+    assert findings(run(**uneven)) == []
+    [finding] = findings(run(**uneven, **{"chassis.pitch": 0 * TIME}))
+    assert "chassis.pitch reads 0 instead of -0.431 deg" in finding.sentence
+
+
+def test_a_spike_in_what_drives_the_model_is_a_fault():
+    spiked = np.zeros_like(TIME)
+    spiked[800] = 0.1
+    [finding] = findings(run(**{"wheel.rl.z": spiked}))
+    assert "wheel.rl.z jumps to 100 mm" in finding.sentence
+    assert finding.fault
 
 
 def test_a_car_that_rolls_at_the_start_has_no_rest_value():
