@@ -42,8 +42,8 @@ export function view() {
         ? h("ul", { className: "runs" }, runs.map(runRow))
         : h("p", { className: "empty" }, "No measurement yet; add one under Measurements."),
       h("p", { className: "hint" },
-        "Unless you choose, the recording on show is fitted, or the first. A run held out shows how well the car " +
-        "predicts what it has not seen."),
+        "Unless you choose, the recording on show is fitted, or the first. A run held out shows how " +
+        "well the car predicts what it has not seen."),
       preparation.view(),
       noise.view(fitted())),
     free.view());
