@@ -10,6 +10,14 @@ import * as units from "./units.js";
 const GROUPS = [["chassis", "Sprung mass"], ["front", "Front axle"], ["rear", "Rear axle"],
   ["brakes", "Brakes"]];
 
+/** What is chosen rather than measured, by the last word of its path: its label, value and word. */
+const CHOICES = {
+  driven: ["driven", [[true, "yes"], [false, "no"]]],
+  torque_reaction: ["drive torque reacts on", [["chassis", "chassis"], ["arm", "arm"]]],
+  reaction: ["torque reacts on", [["arm", "arm"], ["chassis", "chassis"]]],
+};
+const USUAL_BRAKES = { front_share: 0.65, reaction: "arm" };
+
 /** A field of the panel is being changed: it must not be built anew under the hand. */
 let own = false;
 
@@ -57,17 +65,37 @@ function show() {
       h("button", { type: "button", on: { click: download } }, "Save file")),
     h("p", { className: "hint" }, "What is known of the car, in SI units. Unlike the sliders, " +
       "these numbers are never identified: a wrong mass ends up in the stiffnesses."),
-    h("div", { className: "known" }, GROUPS.filter(([key]) => vehicle[key]).map(([key, title]) =>
+    h("div", { className: "known" }, GROUPS.map(([key, title]) =>
       h("fieldset", {}, h("legend", {}, title),
-        leaves(vehicle[key], key).filter((path) => !sliders.has(path)).map((path) =>
-          entry(vehicle, path))))));
+        vehicle[key]
+          ? leaves(vehicle[key], key).filter((path) => !sliders.has(path)).map((path) =>
+              lastWord(path) in CHOICES ? choice(vehicle, path) : entry(vehicle, path))
+          : h("p", { className: "hint" }, "None, so nothing is learnt of a run that brakes. ",
+              h("button", { type: "button", on: { click: addBrakes } }, "Add brakes"))))));
+}
+
+const lastWord = (path) => path.split(".").at(-1);
+
+function choice(vehicle, path) {
+  const [label, values] = CHOICES[lastWord(path)];
+  const chosen = () => ({ [path]: values[select.selectedIndex][0] });
+  const select = h("select", {
+    on: { change: () => keep((car) => withValues(car, chosen()), show) },
+  }, values.map(([value, word]) =>
+    h("option", { selected: value === valueAt(vehicle, path) }, word)));
+  return h("label", { className: "known-row", title: path }, h("span", {}, label), select);
+}
+
+async function addBrakes() {
+  await keep((car) => ({ ...car, brakes: USUAL_BRAKES }), show);
+  show();
 }
 
 function leaves(part, path) {
   return Object.entries(part).flatMap(([key, value]) => {
     const here = `${path}.${key}`;
     if (value && typeof value === "object" && !Array.isArray(value)) return leaves(value, here);
-    return typeof value === "number" ? [here] : [];
+    return typeof value === "number" || key in CHOICES ? [here] : [];
   });
 }
 
@@ -84,12 +112,21 @@ function entry(vehicle, path) {
 
 async function change(path, field) {
   const value = field.value === "" ? NaN : Number(field.value);
-  if (!Number.isFinite(value)) {
-    field.value = units.plain(valueAt(get("vehicle"), path), 6);
-    return;
-  }
-  const vehicle = withValues(get("vehicle"), { ...get("values"), [path]: value });
-  const baseline = withValues(get("baseline"), { [path]: value });
+  const restore = () => { field.value = units.plain(valueAt(get("vehicle"), path), 6); };
+  if (Number.isFinite(value)) await keep((car) => withValues(car, { [path]: value }), restore);
+  else restore();
+}
+
+let edits = Promise.resolve();
+/** Edit the car of the sliders and the baseline alike; `restore` what is shown if it is refused. */
+function keep(edit, restore) {
+  edits = edits.then(() => save(edit, restore));
+  return edits;
+}
+
+async function save(edit, restore) {
+  const vehicle = edit(withValues(get("vehicle"), get("values")));
+  const baseline = edit(get("baseline"));
   try {
     await api.saveVehicle(vehicle);
     await api.saveBaseline(baseline);
@@ -99,7 +136,7 @@ async function change(path, field) {
   } catch (error) {
     if (error.lost) set({ online: false });
     refused(error, "Changing the car");
-    field.value = units.plain(valueAt(get("vehicle"), path), 6);
+    restore();
   }
 }
 

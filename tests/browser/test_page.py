@@ -270,6 +270,29 @@ def test_another_car_changes_sliders_and_scene(spectator):
     assert position(spectator, "/car/wheel_fl")[1] == pytest.approx(track / 2, abs=0.02)
 
 
+def test_brakes_and_drive_are_chosen_on_the_page(visitor):
+    """The sample car comes without brakes and with its rear axle driven; a car must be driven."""
+    visitor.click("#tab-car")
+    visitor.page.get_by_role("button", name="Add brakes").click()
+    visitor.until("ridetune.state('vehicle').brakes?.front_share === 0.65")
+    visitor.page.locator("[title='brakes.reaction'] select").select_option("chassis")
+    visitor.until("ridetune.state('vehicle').brakes.reaction === 'chassis'")
+    visitor.page.locator("[title='front.driven'] select").select_option("yes")
+    visitor.until("ridetune.state('vehicle').front.driven")
+    visitor.page.reload()
+    visitor.wait_until_drawn()
+    assert visitor.look("ridetune.state('vehicle').front.driven")
+    assert visitor.look("ridetune.state('baseline').brakes.reaction") == "chassis"
+
+    visitor.expect("status of 422")
+    visitor.click("#tab-car")
+    for axle in ("front", "rear"):
+        visitor.page.locator(f"[title='{axle}.driven'] select").select_option("no")
+    visitor.wait(lambda: visitor.element(".notice.error").is_visible(), "the refusal is shown")
+    rear = visitor.page.locator("[title='rear.driven'] select")
+    assert rear.input_value() == "yes"
+
+
 def test_an_impossible_car_is_refused_in_words(visitor):
     visitor.expect("status of 422")
     visitor.click("#tab-car")
