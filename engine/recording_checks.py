@@ -123,7 +123,9 @@ def _rest_values(run: Run, vehicle: Vehicle) -> list[str]:
         rest = float(np.mean(run[name][start])) if name in run else value
         if abs(rest - value) > REST_LIMITS[name]:
             shown = channel(name)
-            read, put = (f"{round(shown.display_factor * one, 3) + 0.0:g}" for one in (rest, value))
+            read, put = (
+                f"{round(shown.display_factor * one, 3) + 0.0:.3g}" for one in (rest, value)
+            )
             readings.append(f"{name} reads {read} instead of {put} {shown.display_unit}")
     if not readings:
         return []
