@@ -27,7 +27,7 @@ from .channels import (
 )
 from .csv_table import LARGEST_FILE, CsvTable, is_number, split_title
 from .errors import MeasurementError
-from .run_notes import RunNotes, checked_noise, doubtful_noise, read_notes
+from .run_notes import RunNotes, checked_noise, doubtful_noise, notes_beside, read_notes
 from .spikes import spikes
 from .units import UnitError, to_si
 
@@ -55,7 +55,7 @@ def read_run(path: str | Path, *, noise: Mapping[str, float] | None = None) -> R
     noise : standard deviations in SI by channel; they go before those of the notes
     """
     path = Path(path)
-    beside = path.parent / f"{path.stem}.toml"
+    beside = notes_beside(path)
     notes = read_notes(beside) if beside.is_file() else RunNotes()
     try:
         with path.open("rb") as stream:

@@ -48,6 +48,11 @@ class RunNotes:
     description: str = ""
 
 
+def notes_beside(recording: Path) -> Path:
+    """Where the notes of a recording lie, if it has any."""
+    return recording.parent / f"{recording.stem}.toml"
+
+
 def read_notes(path: Path) -> RunNotes:
     """The notes in a file, checked; every message starts with the file's name."""
     try:

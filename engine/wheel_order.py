@@ -12,6 +12,7 @@ RISE, which keeps what left and right tracks do not share and hills do not hide.
 """
 
 import operator
+from collections.abc import Iterable
 from itertools import permutations
 
 import numpy as np
@@ -61,11 +62,10 @@ def exchanged_wheels(run: Run, wheelbase: float) -> list[str]:
     furthest = round(NEAR * wheelbase / CELL)
     if rises.shape[1] < behind + furthest + SHORTEST / CELL or np.any(np.ptp(rises, axis=1) == 0.0):
         return []
-    likeness = _likeness(rises, behind)
+    likeness = _likeness(rises, behind, permutations(AS_GIVEN))
     best = max(likeness.values())
-    given = max(
-        _likeness(rises, lag)[AS_GIVEN] for lag in range(behind - furthest, behind + furthest + 1)
-    )
+    lags = range(behind - furthest, behind + furthest + 1)
+    given = max(_likeness(rises, lag, [AS_GIVEN])[AS_GIVEN] for lag in lags)
     if best < ALIKE or given > FAR_LESS * best:
         return []
     order = _likeliest(run, [one for one, value in likeness.items() if value > best - TIE])
@@ -81,12 +81,12 @@ def exchanged_wheels(run: Run, wheelbase: float) -> list[str]:
     ]
 
 
-def _likeness(rises: Array, lag: int) -> dict[Order, float]:
+def _likeness(rises: Array, lag: int, orders: Iterable[Order]) -> dict[Order, float]:
     """By order, the mean correlation of the sides' front rises with the rear ones `lag` later."""
     follows = np.corrcoef(rises[:, :-lag], rises[:, lag:])[:4, 4:]
     return {
         order: 0.5 * float(follows[order[0], order[2]] + follows[order[1], order[3]])
-        for order in permutations(AS_GIVEN)
+        for order in orders
     }
 
 

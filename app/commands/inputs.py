@@ -10,7 +10,7 @@ from ...engine.channels import Run
 from ...engine.errors import ManoeuvreError, MeasurementError, RideError, VehicleError
 from ...engine.manoeuvre import Manoeuvre, read_manoeuvre, reference_manoeuvres
 from ...engine.measurement import read_run
-from ...engine.run_notes import read_notes
+from ...engine.run_notes import notes_beside, read_notes
 from ...engine.vehicle import Vehicle
 from ...engine.vehicle_file import read_vehicle, reference_vehicles
 from .arguments import braking
@@ -59,7 +59,7 @@ def read_runs(
 
 def recording_files(paths: Iterable[str]) -> list[Path]:
     """All that `read_runs` reads: each recording, and where its notes are if it has any."""
-    return [one for path in map(Path, paths) for one in (path, path.parent / f"{path.stem}.toml")]
+    return [one for path in map(Path, paths) for one in (path, notes_beside(path))]
 
 
 def read_noise(path: str | None) -> Mapping[str, float]:
