@@ -1,6 +1,7 @@
 """Rows of the lanes' buffer: where a group of cars keeps states, inputs and its own numbers."""
 
 from ..jit import inlined
+from .kinematics import Turn
 from .lanes import loader, storer
 from .records import Body, Corner, State, WheelInput
 
@@ -23,13 +24,17 @@ GIVEN = SUM + STATES
 """A WheelInput for each corner."""
 CONTACT = GIVEN + 4 * WHEEL_ROWS
 """X of each wheel centre and its rate."""
-REACH = CONTACT + 8
+TURNS = CONTACT + 8
+"""Sine and cosine of pitch, roll and the arms' angles at the stage."""
+TURN_ROWS = len(Turn._fields)
+REACH = TURNS + 6 * TURN_ROWS
 """Least reach of an arm and least clearance of a mount since the beginning."""
 CAR = REACH + 1
 ROWS = CAR + CAR_ROWS
 
 _load_body, _load_corner, _load_given = loader(Body), loader(Corner), loader(WheelInput)
 _load_state, _store_state = loader(State), storer(State)
+_load_turn, _store_turn = loader(Turn), storer(Turn)
 
 
 @inlined
@@ -48,6 +53,18 @@ def corner_of(buffer, index, LANES, lane):
 def given_to(buffer, index, LANES, lane):
     """What acts on one wheel of a lane's car."""
     return _load_given(buffer, GIVEN + index * WHEEL_ROWS, LANES, lane)
+
+
+@inlined
+def turn_of(buffer, index, LANES, lane):
+    """Sine and cosine of one of a lane's angles: pitch, roll, arms."""
+    return _load_turn(buffer, TURNS + index * TURN_ROWS, LANES, lane)
+
+
+@inlined
+def keep_turn(buffer, index, LANES, lane, turn):
+    """Store sine and cosine of one of a lane's angles."""
+    _store_turn(buffer, TURNS + index * TURN_ROWS, LANES, lane, turn)
 
 
 @inlined

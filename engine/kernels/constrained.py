@@ -12,6 +12,8 @@ k_i : vertical acceleration of the wheel centre at zero second derivatives; e_i 
 that rolling resistance is e_i N_i; S_i : spring-damper and bar; s_i : the wheel's share of the
 traction F. Put into the chassis's equations these leave five linear equations for (c'', F), the
 fifth being either x'' = a_x (exact) or F = M a_x + sum e_i N_i (paper).
+
+V_x = 0, V_z = 1, X_cx = 1 and X_cz = 0 are left out of the products.
 """
 
 from math import sqrt
@@ -22,15 +24,15 @@ from .elementary import angle_of
 from .equations import (
     ArmEquation,
     Quad,
+    about_roll_axis,
     arm_equation,
     quad_add,
     quad_scale,
     sprung_mass,
-    wheel_force_effect,
 )
 from .forces import bar_torque, strut
-from .kinematics import ArmPose, WheelMotion, convective_acceleration, pivot, wheel_motion
-from .vec3 import dot
+from .kinematics import ArmPose, WheelMotion, pivot, turned, wheel_motion
+from .vec3 import add, cross, dot
 
 
 class RimCorner(NamedTuple):
@@ -39,18 +41,13 @@ class RimCorner(NamedTuple):
     arm: ArmPose
     wheel: WheelMotion
     equation: ArmEquation
-    lever: float
-    """g: rise of the wheel centre per unit of arm angle, m/rad."""
-    vertical: Quad
-    """V"""
-    free_rise: float
-    """u'' - k"""
+    bend: "Bend"
+    force: Quad
+    """V - e X_c: on the chassis per unit of N, with its rolling resistance."""
+    force_arm: float
+    """g - e X: on the arm."""
     resistance: float
     """e"""
-    rolling: Quad
-    """X_c"""
-    rolling_arm: float
-    """X"""
     traction: Quad
     """s D_c"""
     traction_arm: float
@@ -61,6 +58,15 @@ class RimCorner(NamedTuple):
     """Positive while the wheel centre can reach its prescribed height."""
     clearance: float
     """Of the spring-damper's mount."""
+
+
+class Bend(NamedTuple):
+    """Arm's acceleration a'' = constant + z z'' + pitch pitch'' + roll roll'' (eq. 13)."""
+
+    z: float
+    pitch: float
+    roll: float
+    constant: float
 
 
 class Linear(NamedTuple):
@@ -91,7 +97,8 @@ def reached_arm(corner, chassis, z, z_rate, rim):
     """Arm pose that puts the wheel centre at its prescribed height and rise rate.
 
     e_Z . (pivot + Ry(a) p) = rest + u - z is P cos a + Q sin a = D; of the two solutions the one
-    around a = 0. Returns the pose and 1 - D^2 / (P^2 + Q^2), negative out of reach.
+    around a = 0. Its rate a' = (u' - z' - e_Z . (w x centre)) / g. Returns the pose and
+    1 - D^2 / (P^2 + Q^2), negative out of reach.
     """
     e = chassis.e_Z
     P = e[0] * corner.arm_x + e[2] * corner.arm_z
@@ -104,17 +111,32 @@ def reached_arm(corner, chassis, z, z_rate, rim):
     signed = k if Q >= 0.0 else -k
     cosine_a = (P * D + Q * signed) / square
     sine_a = (Q * D - P * signed) / square
-    angle = angle_of(sine_a, cosine_a)
-    at_rest = ArmPose(angle, sine_a, cosine_a, 0.0)
-    carried = wheel_motion(corner, chassis, at_rest, z, 0.0, z_rate)
-    rate = (rim.u_rate - carried.rise_rate) / rise_per_angle(chassis, carried)
-    return ArmPose(angle, sine_a, cosine_a, rate), reach
+    still = ArmPose(angle_of(sine_a, cosine_a), sine_a, cosine_a, 0.0)
+    p = turned(corner.arm_x, 0.0, corner.arm_z, still)
+    carried = z_rate + dot(cross(e, chassis.w), add(pivot(corner), p))
+    rate = (rim.u_rate - carried) / rise_per_angle(chassis, p)
+    return ArmPose(still.angle, sine_a, cosine_a, rate), reach
 
 
 @inlined
-def rise_per_angle(chassis, wheel):
+def rise_per_angle(chassis, p):
     """g = e_Z . (e_y x p), m/rad: positive lever for the rear, negative for the front."""
-    return chassis.e_Z[0] * wheel.arm[2] - chassis.e_Z[2] * wheel.arm[0]
+    return chassis.e_Z[0] * p[2] - chassis.e_Z[2] * p[0]
+
+
+@inlined
+def free_rise(chassis, arm, wheel):
+    """k = e_Z . (T C + 2 a' w x (e_y x p) + a'^2 e_y x (e_y x p)) of the wheel centre C, m/s2."""
+    e, T = chassis.e_Z, chassis.turning
+    carried = (
+        e[0] * T[0][0] + e[1] * T[1][0] + e[2] * T[2][0],
+        e[0] * T[0][1] + e[1] * T[1][1] + e[2] * T[2][1],
+        e[0] * T[0][2] + e[1] * T[1][2] + e[2] * T[2][2],
+    )
+    turning, p = cross(e, chassis.w), wheel.arm
+    coriolis = 2.0 * arm.rate * (turning[0] * p[2] - turning[2] * p[0])
+    inwards = arm.rate * arm.rate * (e[0] * p[0] + e[2] * p[2])
+    return dot(carried, wheel.centre) + coriolis - inwards
 
 
 @inlined
@@ -125,27 +147,29 @@ def rim_corner(corner, chassis, z, z_rate, rim, direction, braking):
     """
     arm, reach = reached_arm(corner, chassis, z, z_rate, rim)
     wheel = wheel_motion(corner, chassis, arm, z, 0.0, z_rate)
-    equation = arm_equation(corner, chassis, arm)
-    vertical, lever = wheel_force_effect(chassis, wheel, 0.0, 1.0, corner.radius)
-    rolling, rolling_arm = wheel_force_effect(chassis, wheel, 1.0, 0.0, corner.radius)
-    convective = convective_acceleration(chassis, arm, wheel.centre, wheel.arm)
+    lever = rise_per_angle(chassis, wheel.arm)
+    up_pitch, up_roll = -wheel.ahead, about_roll_axis(wheel.centre, chassis.e_Z)
+    p, radius = wheel.arm, corner.radius
+    back_pitch, back_roll = wheel.above - radius, about_roll_axis(wheel.centre, chassis.e_X)
+    back_arm = chassis.e_X[0] * p[2] - chassis.e_X[2] * p[0] - radius * chassis.e_Y[1]
+    e = corner.rolling_resistance * direction
     driven = (1.0 - braking) * corner.drive_share
     braked = braking * corner.brake_share
-    torque = corner.radius * (driven * corner.drive_reaction + braked * corner.brake_reaction)
+    torque = radius * (driven * corner.drive_reaction + braked * corner.brake_reaction)
     share = driven + braked
-    element = strut(corner, wheel.arm, arm)
+    element = strut(corner, p, arm)
+    per_lever = 1.0 / lever
+    rise = rim.u_acceleration - free_rise(chassis, arm, wheel)
     return RimCorner(
         arm,
         wheel,
-        equation,
-        lever,
-        vertical,
-        rim.u_acceleration - dot(chassis.e_Z, convective),
-        corner.rolling_resistance * direction,
-        rolling,
-        rolling_arm,
-        quad_scale(share, rolling),
-        share * rolling_arm + torque,
+        arm_equation(corner, chassis, arm),
+        Bend(-per_lever, -per_lever * up_pitch, -per_lever * up_roll, per_lever * rise),
+        Quad(-e, 1.0, up_pitch - e * back_pitch, up_roll - e * back_roll),
+        lever - e * back_arm,
+        e,
+        Quad(share, 0.0, share * back_pitch, share * back_roll),
+        share * back_arm + torque,
         element.moment,
         reach,
         element.clearance,
@@ -153,34 +177,37 @@ def rim_corner(corner, chassis, z, z_rate, rim, direction, braking):
 
 
 @inlined
-def arm_acceleration(corner):
-    """Affine a'' (eq. 13)."""
-    inverse = 1.0 / corner.lever
-    return Linear(quad_scale(-inverse, corner.vertical), 0.0, inverse * corner.free_rise)
-
-
-@inlined
 def wheel_load(corner, moment):
     """Affine N (eq. 14); moment : S with the bar, N m."""
-    equation = corner.equation
-    bend = arm_acceleration(corner)
-    inverse = 1.0 / (corner.lever - corner.resistance * corner.rolling_arm)
-    on = quad_add(equation.coupling, quad_scale(equation.inertia, bend.on))
-    constant = equation.inertia * bend.constant + equation.bias - moment
-    return Linear(quad_scale(inverse, on), -inverse * corner.traction_arm, inverse * constant)
+    m, bend, inertia = corner.equation.coupling, corner.bend, corner.equation.inertia
+    inverse = 1.0 / corner.force_arm
+    return Linear(
+        Quad(
+            inverse * m.x,
+            inverse * (m.z + inertia * bend.z),
+            inverse * (m.pitch + inertia * bend.pitch),
+            inverse * (m.roll + inertia * bend.roll),
+        ),
+        -inverse * corner.traction_arm,
+        inverse * (inertia * bend.constant + corner.equation.bias - moment),
+    )
 
 
 @inlined
-def row(mass_row, coupling, force, traction, bend, load):
+def row(mass_row, bias, coupling, force, traction, bend, load):
     """One chassis equation's share from one corner, everything on the left-hand side.
 
-    mass_row . c'' + coupling a'' - force N - traction F
+    mass_row . c'' + bias + coupling a'' - force N - traction F
     """
-    on = quad_add(quad_add(mass_row, quad_scale(coupling, bend.on)), quad_scale(-force, load.on))
     return Linear(
-        on,
+        Quad(
+            mass_row.x - force * load.on.x,
+            mass_row.z + coupling * bend.z - force * load.on.z,
+            mass_row.pitch + coupling * bend.pitch - force * load.on.pitch,
+            mass_row.roll + coupling * bend.roll - force * load.on.roll,
+        ),
         -traction - force * load.traction,
-        coupling * bend.constant - force * load.constant,
+        bias + coupling * bend.constant - force * load.constant,
     )
 
 
@@ -193,35 +220,18 @@ def linear_add(a, b):
 @inlined
 def corner_rows(corner, moment):
     """Shares of one corner in the chassis's equations z, pitch, roll and x, and its load."""
-    equation = corner.equation
-    bend = arm_acceleration(corner)
-    load = wheel_load(corner, moment)
-    mass, m, bias = equation.chassis_mass, equation.coupling, equation.chassis_bias
-    up, back, e = corner.vertical, corner.rolling, corner.resistance
-    pull = corner.traction
-    z = row(Quad(mass.xz, mass.zz, mass.zp, mass.zr), m.z, up.z - e * back.z, pull.z, bend, load)
-    pitch = row(
-        Quad(mass.xp, mass.zp, mass.pp, mass.pr),
-        m.pitch,
-        up.pitch - e * back.pitch,
-        pull.pitch,
-        bend,
-        load,
-    )
-    roll = row(
-        Quad(mass.xr, mass.zr, mass.pr, mass.rr),
-        m.roll,
-        up.roll - e * back.roll,
-        pull.roll,
-        bend,
-        load,
-    )
-    x = row(Quad(mass.xx, mass.xz, mass.xp, mass.xr), m.x, up.x - e * back.x, pull.x, bend, load)
+    equation, bend, load = corner.equation, corner.bend, wheel_load(corner, moment)
+    mass, bias, m = equation.chassis_mass, equation.chassis_bias, equation.coupling
+    force, pull = corner.force, corner.traction
+    in_z = Quad(mass.xz, mass.zz, mass.zp, mass.zr)
+    in_pitch = Quad(mass.xp, mass.zp, mass.pp, mass.pr)
+    in_roll = Quad(mass.xr, mass.zr, mass.pr, mass.rr)
+    in_x = Quad(mass.xx, mass.xz, mass.xp, mass.xr)
     return (
-        Linear(z.on, z.traction, z.constant + bias.z),
-        Linear(pitch.on, pitch.traction, pitch.constant + bias.pitch),
-        Linear(roll.on, roll.traction, roll.constant + bias.roll),
-        Linear(x.on, x.traction, x.constant + bias.x),
+        row(in_z, bias.z, m.z, force.z, pull.z, bend, load),
+        row(in_pitch, bias.pitch, m.pitch, force.pitch, pull.pitch, bend, load),
+        row(in_roll, bias.roll, m.roll, force.roll, pull.roll, bend, load),
+        row(in_x, bias.x, m.x, force.x, pull.x, bend, load),
         load,
     )
 
@@ -305,14 +315,29 @@ def value(function, acceleration, traction):
 
 
 @inlined
+def bent(bend, acceleration):
+    """An arm's acceleration once the chassis's is known."""
+    c = acceleration
+    return bend.constant + bend.z * c.z + bend.pitch * c.pitch + bend.roll * c.roll
+
+
+@inlined
+def rim_bar_torque(stiffness, damping, left, right):
+    """Torque of a bar between two arms known by sine and cosine: one arc tangent does for both."""
+    sine = left.sine * right.cosine - left.cosine * right.sine
+    cosine = left.cosine * right.cosine + left.sine * right.sine
+    return bar_torque(stiffness, damping, angle_of(sine, cosine), left.rate - right.rate)
+
+
+@inlined
 def rim_accelerations(body, chassis, fl, fr, rl, rr, a_x, exact):
     """All second derivatives, the traction and the vertical forces.
 
     a_x : prescribed chassis acceleration, m/s2; exact : 1.0 to follow it exactly, 0.0 for the
     paper's traction
     """
-    front = bar_torque(body.front_bar_stiffness, body.front_bar_damping, fl.arm, fr.arm)
-    rear = bar_torque(body.rear_bar_stiffness, body.rear_bar_damping, rl.arm, rr.arm)
+    front = rim_bar_torque(body.front_bar_stiffness, body.front_bar_damping, fl.arm, fr.arm)
+    rear = rim_bar_torque(body.rear_bar_stiffness, body.rear_bar_damping, rl.arm, rr.arm)
     fl_z, fl_p, fl_r, fl_x, fl_load = corner_rows(fl, fl.moment - front)
     fr_z, fr_p, fr_r, fr_x, fr_load = corner_rows(fr, fr.moment + front)
     rl_z, rl_p, rl_r, rl_x, rl_load = corner_rows(rl, rl.moment - rear)
@@ -349,10 +374,10 @@ def rim_accelerations(body, chassis, fl, fr, rl, rr, a_x, exact):
     return RimAccelerations(
         acceleration,
         traction,
-        value(arm_acceleration(fl), acceleration, 0.0),
-        value(arm_acceleration(fr), acceleration, 0.0),
-        value(arm_acceleration(rl), acceleration, 0.0),
-        value(arm_acceleration(rr), acceleration, 0.0),
+        bent(fl.bend, acceleration),
+        bent(fr.bend, acceleration),
+        bent(rl.bend, acceleration),
+        bent(rr.bend, acceleration),
         value(fl_load, acceleration, traction),
         value(fr_load, acceleration, traction),
         value(rl_load, acceleration, traction),

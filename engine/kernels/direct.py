@@ -20,7 +20,7 @@ from .equations import (
     wheel_force_effect,
 )
 from .forces import bar_torque, road_wheel_force, strut, tyre_load
-from .kinematics import ArmPose, Attitude, WheelMotion, arm_pose, attitude, wheel_motion
+from .kinematics import ArmPose, Attitude, WheelMotion, wheel_motion
 
 
 class FreeCorner(NamedTuple):
@@ -49,15 +49,8 @@ class Accelerations(NamedTuple):
 
 
 @inlined
-def chassis_attitude(state):
-    """Attitude of the chassis in a state."""
-    return attitude(state.pitch, state.roll, state.pitch_rate, state.roll_rate)
-
-
-@inlined
-def free_corner(corner, chassis: Attitude, state, angle, rate, given, direction):
+def free_corner(corner, chassis: Attitude, state, arm, given, direction):
     """Forces and inertia of one corner, driven by its contact point and torques."""
-    arm = arm_pose(angle, rate)
     wheel = wheel_motion(corner, chassis, arm, state.z, state.x_rate, state.z_rate)
     load = tyre_load(corner, wheel, given.road, given.road_rate)
     force_X, torque = road_wheel_force(corner, load, given, direction)
@@ -114,10 +107,20 @@ def arm_acceleration(corner, moment, chassis_acceleration):
 
 
 @inlined
+def bar_torques(body, fl, fr, rl, rr):
+    """Torques of both bars from the arms' poses."""
+    front_stiffness, front_damping = body.front_bar_stiffness, body.front_bar_damping
+    rear_stiffness, rear_damping = body.rear_bar_stiffness, body.rear_bar_damping
+    return (
+        bar_torque(front_stiffness, front_damping, fl.angle - fr.angle, fl.rate - fr.rate),
+        bar_torque(rear_stiffness, rear_damping, rl.angle - rr.angle, rl.rate - rr.rate),
+    )
+
+
+@inlined
 def accelerations(body, chassis, fl, fr, rl, rr):
     """Second derivatives of all coordinates from the four corners' forces and inertias."""
-    front = bar_torque(body.front_bar_stiffness, body.front_bar_damping, fl.arm, fr.arm)
-    rear = bar_torque(body.rear_bar_stiffness, body.rear_bar_damping, rl.arm, rr.arm)
+    front, rear = bar_torques(body, fl.arm, fr.arm, rl.arm, rr.arm)
     fl_moment, fr_moment = fl.moment - front, fr.moment + front
     rl_moment, rr_moment = rl.moment - rear, rr.moment + rear
     mass, bias = sprung_mass(body, chassis)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 from ..frames import GRAVITY
 from ..jit import inlined
 from .kinematics import convective_acceleration, pivot, turned
-from .vec3 import add, cross, dot, scale
+from .vec3 import add, cross, cross_xz, dot, scale
 
 
 class ChassisMass(NamedTuple):
@@ -112,9 +112,21 @@ def generalized_force(chassis, force_B, moment_B):
     return Quad(
         dot(chassis.e_X, force_B),
         dot(chassis.e_Z, force_B),
-        dot(chassis.e_Y, moment_B),
+        about_pitch_axis(chassis, moment_B),
         moment_B[0],
     )
+
+
+@inlined
+def about_pitch_axis(chassis, moment_B):
+    """e_Y . moment; e_Y has no x."""
+    return chassis.e_Y[1] * moment_B[1] + chassis.e_Y[2] * moment_B[2]
+
+
+@inlined
+def about_roll_axis(arm, force):
+    """x of arm x force, both in B."""
+    return arm[1] * force[2] - arm[2] * force[1]
 
 
 @inlined
@@ -139,16 +151,19 @@ def sprung_mass(body, chassis):
     """Mass matrix and bias of the sprung mass alone; its CG is the reference point."""
     pp, pr, rr = rotational_mass(chassis, body.xx, body.yy, body.zz, 0.0, 0.0, body.xz)
     moment = inertia_moment(body.xx, body.yy, body.zz, body.xz, chassis.w, chassis.w_rate)
-    rotation = generalized_force(chassis, (0.0, 0.0, 0.0), moment)
     return (
         ChassisMass(body.mass, 0.0, body.mass, 0.0, 0.0, 0.0, 0.0, pp, pr, rr),
-        Quad(0.0, body.mass * GRAVITY, rotation.pitch, rotation.roll),
+        Quad(0.0, body.mass * GRAVITY, about_pitch_axis(chassis, moment), moment[0]),
     )
 
 
 @inlined
 def arm_equation(corner, chassis, arm):
-    """Inertia of wheel and arm, one rigid body hinged to the chassis about y at the pivot."""
+    """Inertia of wheel and arm, one rigid body hinged to the chassis about y at the pivot.
+
+    Its centre of gravity c moves by e_Y x c per unit of pitch and by e_x x c per unit of roll, so
+    that e_X . (e_Y x c) = e_Z . c and e_Z . (e_Y x c) = -e_X . c.
+    """
     p = turned(corner.cg_x, corner.cg_y, corner.cg_z, arm)
     c = add(pivot(corner), p)
     mass = corner.mass
@@ -167,25 +182,28 @@ def arm_equation(corner, chassis, arm):
         -mass * c[1] * c[2],
         xz - mass * c[0] * c[2],
     )
-    by_pitch = cross(chassis.e_Y, c)
-    by_roll = (0.0, -c[2], c[1])
     chassis_mass = ChassisMass(
         mass,
         0.0,
         mass,
-        mass * dot(chassis.e_X, by_pitch),
-        mass * dot(chassis.e_X, by_roll),
-        mass * dot(chassis.e_Z, by_pitch),
-        mass * dot(chassis.e_Z, by_roll),
+        mass * dot(chassis.e_Z, c),
+        mass * about_roll_axis(c, chassis.e_X),
+        -mass * dot(chassis.e_X, c),
+        mass * about_roll_axis(c, chassis.e_Z),
         pp,
         pr,
         rr,
     )
 
-    along = (p[2], 0.0, -p[0])
-    momentum = scale(mass, along)
-    spin = add(cross(c, momentum), (0.0, corner.yy, 0.0))
-    coupling = generalized_force(chassis, momentum, spin)
+    # Momentum and spin per unit of the arm's rate; c moves along e_y x p = (p_z, 0, -p_x).
+    x_momentum, z_momentum = mass * p[2], -mass * p[0]
+    spin = add(cross_xz(c, x_momentum, z_momentum), (0.0, corner.yy, 0.0))
+    coupling = Quad(
+        chassis.e_X[0] * x_momentum + chassis.e_X[2] * z_momentum,
+        chassis.e_Z[0] * x_momentum + chassis.e_Z[2] * z_momentum,
+        about_pitch_axis(chassis, spin),
+        spin[0],
+    )
     inertia = corner.yy + mass * (p[0] * p[0] + p[2] * p[2])
 
     upward = scale(GRAVITY, chassis.e_Z)
@@ -202,12 +220,17 @@ def arm_equation(corner, chassis, arm):
 def wheel_force_effect(chassis, wheel, force_X, force_Z, radius):
     """Generalized forces of a longitudinal and a vertical force on a wheel.
 
-    The vertical force's line of action passes through the wheel centre; the longitudinal one
-    acts r below it along inertial Z, which adds the moment -r Fx about e_Y.
+    The vertical force's line of action passes through the wheel centre C; the longitudinal one
+    acts r below it along inertial Z, which adds the moment -r Fx about e_Y. About e_Y the arms of
+    the two are e_Y . (C x e_X) = e_Z . C and e_Y . (C x e_Z) = -e_X . C.
     Returns the chassis's Quad and the arm's moment about its pivot.
     """
     force = add(scale(force_X, chassis.e_X), scale(force_Z, chassis.e_Z))
-    below = scale(-radius * force_X, chassis.e_Y)
-    on_chassis = generalized_force(chassis, force, add(cross(wheel.centre, force), below))
-    on_arm = wheel.arm[2] * force[0] - wheel.arm[0] * force[2] + below[1]
-    return on_chassis, on_arm
+    on_chassis = Quad(
+        force_X,
+        force_Z,
+        force_X * (wheel.above - radius) - force_Z * wheel.ahead,
+        about_roll_axis(wheel.centre, force),
+    )
+    p, below = wheel.arm, -radius * force_X * chassis.e_Y[1]
+    return on_chassis, p[2] * force[0] - p[0] * force[2] + below

@@ -6,7 +6,6 @@ from typing import NamedTuple
 from ..frames import CREEP_SPEED
 from ..jit import inlined
 from .elementary import hyperbolic_tangent
-from .vec3 import y_cross
 
 
 class Strut(NamedTuple):
@@ -22,7 +21,7 @@ class Strut(NamedTuple):
     moment: float
     """On the arm about its pivot, N m."""
     clearance: float
-    """Height of the mount above the wheel centre over that at rest; at 0 the wheel passes it."""
+    """Height of the mount above the wheel centre, m; at 0 the wheel passes it."""
 
 
 @inlined
@@ -41,20 +40,22 @@ def strut(corner, p, arm):
     x, z = corner.mount_x - p[0], corner.mount_z - p[2]
     length = sqrt(x * x + z * z)
     axis_x, axis_z = x / length, z / length
-    along = y_cross(p)
-    length_rate = -arm.rate * (axis_x * along[0] + axis_z * along[2])
+    lever = axis_x * p[2] - axis_z * p[0]
+    length_rate = -arm.rate * lever
     travel = corner.rest_length - length
     spring = corner.preload + corner.stiffness * travel
     damper = -corner.damping * length_rate
-    moment = -(spring + damper) * (axis_x * along[0] + axis_z * along[2])
-    clearance = z / corner.rest_length
-    return Strut(travel, spring, damper, axis_x, axis_z, moment, clearance)
+    moment = -(spring + damper) * lever
+    return Strut(travel, spring, damper, axis_x, axis_z, moment, z)
 
 
 @inlined
-def bar_torque(stiffness, damping, left, right):
-    """Torque of a stabilizer bar: minus this on the left arm, plus this on the right one."""
-    return stiffness * (left.angle - right.angle) + damping * (left.rate - right.rate)
+def bar_torque(stiffness, damping, twist, twist_rate):
+    """Torque of a stabilizer bar: minus this on the left arm, plus this on the right one.
+
+    twist : angle of the left arm less that of the right one, rad
+    """
+    return stiffness * twist + damping * twist_rate
 
 
 @inlined

@@ -23,11 +23,13 @@ from .buffer import (
     given_to,
     keep_slope,
     stage_state,
+    turn_of,
 )
 from .constrained import rim_accelerations, rim_corner
 from .contact import find_contacts, read_road
-from .direct import accelerations, chassis_attitude, free_corner
+from .direct import accelerations, free_corner
 from .forces import direction_of_travel
+from .kinematics import arm_pose, attitude, turn_by
 from .records import RimInput, State
 
 _ANGLE_LIMIT = 1.5
@@ -61,18 +63,23 @@ def slope_of(state, c, fl, fr, rl, rr):
 
 @inlined
 def free_car(buffer, LANES, j):
-    """Attitude, corners and accelerations of a lane's free car at the stage."""
+    """Attitude, corners and accelerations of a lane's free car at the stage, its contacts found."""
     state = stage_state(buffer, LANES, j)
-    chassis = chassis_attitude(state)
+    pitch, roll = turn_of(buffer, 0, LANES, j), turn_of(buffer, 1, LANES, j)
+    chassis = attitude(pitch, roll, state.pitch_rate, state.roll_rate)
     way = direction_of_travel(state.x_rate)
+    arm = arm_pose(state.fl, turn_of(buffer, 2, LANES, j), state.fl_rate)
     corner, given = corner_of(buffer, 0, LANES, j), given_to(buffer, 0, LANES, j)
-    fl = free_corner(corner, chassis, state, state.fl, state.fl_rate, given, way)
+    fl = free_corner(corner, chassis, state, arm, given, way)
+    arm = arm_pose(state.fr, turn_of(buffer, 3, LANES, j), state.fr_rate)
     corner, given = corner_of(buffer, 1, LANES, j), given_to(buffer, 1, LANES, j)
-    fr = free_corner(corner, chassis, state, state.fr, state.fr_rate, given, way)
+    fr = free_corner(corner, chassis, state, arm, given, way)
+    arm = arm_pose(state.rl, turn_of(buffer, 4, LANES, j), state.rl_rate)
     corner, given = corner_of(buffer, 2, LANES, j), given_to(buffer, 2, LANES, j)
-    rl = free_corner(corner, chassis, state, state.rl, state.rl_rate, given, way)
+    rl = free_corner(corner, chassis, state, arm, given, way)
+    arm = arm_pose(state.rr, turn_of(buffer, 5, LANES, j), state.rr_rate)
     corner, given = corner_of(buffer, 3, LANES, j), given_to(buffer, 3, LANES, j)
-    rr = free_corner(corner, chassis, state, state.rr, state.rr_rate, given, way)
+    rr = free_corner(corner, chassis, state, arm, given, way)
     a = accelerations(body_of(buffer, LANES, j), chassis, fl, fr, rl, rr)
     return chassis, fl, fr, rl, rr, a
 
@@ -89,7 +96,8 @@ def rims_at(u):
 def car_on_rims(buffer, LANES, j, rims, a_x, way, b, exact):
     """Attitude, corners and accelerations of a lane's car on its rims at the stage."""
     state = stage_state(buffer, LANES, j)
-    chassis = chassis_attitude(state)
+    pitch, roll = turn_by(state.pitch), turn_by(state.roll)
+    chassis = attitude(pitch, roll, state.pitch_rate, state.roll_rate)
     z, z_rate = state.z, state.z_rate
     fl = rim_corner(corner_of(buffer, 0, LANES, j), chassis, z, z_rate, rims[0], way, b)
     fr = rim_corner(corner_of(buffer, 1, LANES, j), chassis, z, z_rate, rims[1], way, b)
@@ -183,6 +191,14 @@ def _keep(buffer, LANES, states_out, failed, reach, first, sample):
     return sound_left
 
 
+@inlined
+def _stages(inputs):
+    """Stages of a step, four. Read from an array's shape, so that the compiler does not know it:
+    it would write the accelerations out four times, and the code would leave the cache.
+    """
+    return inputs.shape[1] + 1
+
+
 @compiled
 def integrate_free(
     lanes, cars, states, inputs, steps, samples, road, start, spacing, out, failed, reach
@@ -209,7 +225,7 @@ def integrate_free(
             _keep(buffer, LANES, out, failed, reach, first, samples[0])
         for k in range(steps.shape[0]):
             _set_out(buffer, LANES)
-            for stage in range(4):
+            for stage in range(_stages(inputs)):
                 given = inputs[k, (stage + 1) // 2]
                 find_contacts(buffer, LANES)
                 read_road(buffer, LANES, given, road, start, spacing)
@@ -236,7 +252,7 @@ def integrate_rims(lanes, cars, states, inputs, steps, samples, exact, out, fail
             _keep(buffer, LANES, out, failed, reach, first, samples[0])
         for k in range(steps.shape[0]):
             _set_out(buffer, LANES)
-            for stage in range(4):
+            for stage in range(_stages(inputs)):
                 _rim_slopes(buffer, LANES, inputs[k, (stage + 1) // 2], exact)
                 _advance(buffer, LANES, stage, steps[k])
             sample = samples[k + 1]

@@ -11,14 +11,22 @@ so that the pitch rate turns the chassis about e_Y and the roll rate about B's x
     w = (roll', pitch' cos r, -pitch' sin r)                        (eq. 2 of docs/model.md)
 
 `w_rate` is the part of dw/dt left when all second derivatives are zero, pitch' roll' (0, -sin r,
--cos r).
+-cos r). Zeros are left out of products: 0 x is not 0 where x may be infinite, so that the compiler
+would have to multiply.
 """
 
 from typing import NamedTuple
 
 from ..jit import inlined
 from .elementary import cosine, sine
-from .vec3 import add, cross, dot, scale, y_cross
+from .vec3 import add, cross, cross_xz, dot, scale, times, y_cross
+
+
+class Turn(NamedTuple):
+    """Sine and cosine of an angle."""
+
+    sine: float
+    cosine: float
 
 
 class Attitude(NamedTuple):
@@ -29,6 +37,10 @@ class Attitude(NamedTuple):
     e_Z: tuple[float, float, float]
     w: tuple[float, float, float]
     w_rate: tuple[float, float, float]
+    turning: tuple[
+        tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]
+    ]
+    """T with T c = w_rate x c + w x (w x c) for every c."""
 
 
 class ArmPose(NamedTuple):
@@ -45,6 +57,10 @@ class WheelMotion(NamedTuple):
 
     arm: tuple[float, float, float]
     centre: tuple[float, float, float]
+    ahead: float
+    """e_X . centre"""
+    above: float
+    """e_Z . centre"""
     velocity_X: float
     rise: float
     """Vertical displacement from rest."""
@@ -52,23 +68,36 @@ class WheelMotion(NamedTuple):
 
 
 @inlined
+def turn_by(angle):
+    """Sine and cosine of an angle, rad."""
+    return Turn(sine(angle), cosine(angle))
+
+
+@inlined
 def attitude(pitch, roll, pitch_rate, roll_rate):
-    """Attitude of the chassis from its angles (rad) and their rates (rad/s)."""
-    sp, cp, sr, cr = sine(pitch), cosine(pitch), sine(roll), cosine(roll)
+    """Attitude of the chassis from its two turns and their rates (rad/s)."""
+    sp, cp, sr, cr = pitch.sine, pitch.cosine, roll.sine, roll.cosine
     product = pitch_rate * roll_rate
+    a, b, c = roll_rate, pitch_rate * cr, -pitch_rate * sr
+    b_rate, c_rate = -product * sr, -product * cr
     return Attitude(
         (cp, sp * sr, sp * cr),
         (0.0, cr, -sr),
         (-sp, cp * sr, cp * cr),
-        (roll_rate, pitch_rate * cr, -pitch_rate * sr),
-        (0.0, -product * sr, -product * cr),
+        (a, b, c),
+        (0.0, b_rate, c_rate),
+        (
+            (-b * b - c * c, a * b - c_rate, a * c + b_rate),
+            (a * b + c_rate, -a * a - c * c, b * c),
+            (a * c - b_rate, b * c, -a * a - b * b),
+        ),
     )
 
 
 @inlined
-def arm_pose(angle, rate):
+def arm_pose(angle, turn, rate):
     """Pose of an arm whose angle is a coordinate of its own."""
-    return ArmPose(angle, sine(angle), cosine(angle), rate)
+    return ArmPose(angle, turn.sine, turn.cosine, rate)
 
 
 @inlined
@@ -93,11 +122,14 @@ def wheel_motion(corner, chassis, arm, z, x_rate, z_rate):
     centre = add(pivot(corner), p)
     relative = add(cross(chassis.w, centre), scale(arm.rate, y_cross(p)))
     rest = corner.pivot_z + corner.arm_z
+    above = dot(chassis.e_Z, centre)
     return WheelMotion(
         p,
         centre,
+        dot(chassis.e_X, centre),
+        above,
         x_rate + dot(chassis.e_X, relative),
-        z + dot(chassis.e_Z, centre) - rest,
+        z + above - rest,
         z_rate + dot(chassis.e_Z, relative),
     )
 
@@ -106,9 +138,15 @@ def wheel_motion(corner, chassis, arm, z, x_rate, z_rate):
 def convective_acceleration(chassis, arm, from_cg, from_pivot):
     """Acceleration of a point of the arm when all second derivatives are zero, in B.
 
-    w' x c + w x (w x c) + 2 w x (arm' e_y x p) + arm'^2 e_y x (e_y x p)
+    w' x c + w x (w x c) + 2 w x (arm' e_y x p) + arm'^2 e_y x (e_y x p),
+    the last product being -(p_x, 0, p_z)
     """
-    along = y_cross(from_pivot)
-    turning = add(cross(chassis.w_rate, from_cg), cross(chassis.w, cross(chassis.w, from_cg)))
-    coriolis = scale(2.0 * arm.rate, cross(chassis.w, along))
-    return add(add(turning, coriolis), scale(arm.rate * arm.rate, y_cross(along)))
+    x, _, z = from_pivot
+    turning = times(chassis.turning, from_cg)
+    coriolis = scale(2.0 * arm.rate, cross_xz(chassis.w, z, -x))
+    inwards = arm.rate * arm.rate
+    return (
+        turning[0] + coriolis[0] - inwards * x,
+        turning[1] + coriolis[1],
+        turning[2] + coriolis[2] - inwards * z,
+    )

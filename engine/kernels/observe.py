@@ -8,7 +8,8 @@ from ..frames import GRAVITY
 from ..jit import compiled, inlined
 from .buffer import CAR, ROWS, STAGE, STATES, body_of, corner_of, given_to
 from .contact import find_contacts, read_road
-from .forces import bar_torque, direction_of_travel, strut
+from .direct import bar_torques
+from .forces import direction_of_travel, strut
 from .integrate import car_on_rims, free_car, rims_at
 from .kinematics import convective_acceleration, pivot, turned
 from .lanes import storer
@@ -116,15 +117,8 @@ def _rim_output(corner, chassis, seen, c_dd, arm_dd, load, traction, braking):
 
 @inlined
 def _car_output(body, c_dd, traction, fl, fr, rl, rr):
-    return CarOutput(
-        c_dd.x,
-        c_dd.z,
-        c_dd.pitch,
-        c_dd.roll,
-        traction,
-        bar_torque(body.front_bar_stiffness, body.front_bar_damping, fl.arm, fr.arm),
-        bar_torque(body.rear_bar_stiffness, body.rear_bar_damping, rl.arm, rr.arm),
-    )
+    front, rear = bar_torques(body, fl.arm, fr.arm, rl.arm, rr.arm)
+    return CarOutput(c_dd.x, c_dd.z, c_dd.pitch, c_dd.roll, traction, front, rear)
 
 
 @inlined

@@ -28,6 +28,18 @@ def scale(factor, a):
 
 
 @inlined
+def cross_xz(a, x, z):
+    """Vector product a x (x, 0, z)."""
+    return (a[1] * z, a[2] * x - a[0] * z, -a[1] * x)
+
+
+@inlined
 def y_cross(a):
     """e_y x a: the velocity of a point at a per unit angular velocity about y."""
     return (a[2], 0.0, -a[0])
+
+
+@inlined
+def times(matrix, a):
+    """Product of a matrix, given by its three rows, with a vector."""
+    return (dot(matrix[0], a), dot(matrix[1], a), dot(matrix[2], a))
