@@ -144,7 +144,7 @@ def _describe_simulate(command: Parser) -> None:
     command.add_argument("--model", choices=("8dof", "7dof"), default="8dof")
     command.add_argument("--lift-off", action="store_true", help="no tyre pulls at the road")
     _add_rims_mode(command, "--braking 6.2:9.8")
-    _add_step(command, "2 ms unless told, 5 ms with --rims")
+    _add_step(command, "2.5 ms unless told, 5 ms with --rims")
     command.add_argument("--seed", metavar="N", type=_seed, help="another random road")
     command.add_argument("-o", "--output", metavar="FILE", help="the run as CSV")
 

@@ -85,7 +85,7 @@ class SimulationRequest(WireForm):
     """One simulation of the session's car, or of another one.
 
     road : in place of the manoeuvre's
-    lift_off, step, sample_step : with a manoeuvre or posts; 2 ms and 5 ms unless told
+    lift_off, step, sample_step : with a manoeuvre or posts; 2.5 ms and 5 ms unless told
     """
 
     vehicle: JsonObject | None = None

@@ -41,8 +41,8 @@ Array = NDArray[np.float64]
 Model = Literal["8dof", "7dof"]
 Traction = Literal["exact", "paper"]
 
-FREE_STEP = 0.002
-"""Integration step of the road and posts modes, s: wheel hop is in them."""
+FREE_STEP = 0.0025
+"""Integration step of the road and posts modes, s: wheel hop is in them. Two make a sample step."""
 
 FASTEST = 150.0
 """Greatest speed that a simulation may reach, m/s."""

@@ -109,7 +109,7 @@ def test_every_reference_car_takes_the_longest_accepted_step_of_the_page(key):
 def test_a_step_too_long_is_refused_in_every_mode_with_the_longest_one():
     car = paper_vehicle().with_values(STIFF)
     bump, heave = reference_manoeuvres()["bump"], reference_manoeuvres()["heave"]
-    sentence = r"step of 2 ms is too long for this car, .* take a step of at most 0\.\d+ ms, or"
+    sentence = r"step of 2.5 ms is too long for this car, .* take a step of at most 0\.\d+ ms, or"
     for simulate, manoeuvre in ((simulate_road, bump), (simulate_posts, heave)):
         with pytest.raises(SimulationError, match=sentence):
             simulate(car, replace(manoeuvre, duration=2.0), sample_step=0.01)
