@@ -15,6 +15,8 @@ from .kernels.integrate import integrate_free, integrate_rims
 from .kernels.lanes import BATCH, ONE_CAR
 from .kernels.observe import OUTPUTS, CarOutput, CornerOutput, observe_free, observe_rims
 from .kernels.records import Corner
+from .kernels.watch import NOTHING, Watch
+from .reductions import Reduction
 from .rims import RimsInputs
 from .road import Road
 from .stepping import FreeInputs
@@ -54,63 +56,130 @@ class States:
     reach: Array
 
 
-def free_states(cars: Array, inputs: FreeInputs) -> States:
+@dataclass(frozen=True, eq=False)
+class Tallies:
+    """Sums and extremes of each car, which `reductions.figures` reads.
+
+    values (C, columns) : of no meaning where a car has failed
+    failed (C,), reach (C,) : as of `States`
+    """
+
+    values: Array
+    failed: NDArray[np.int64]
+    reach: Array
+
+
+def free_states(cars: Array, inputs: FreeInputs, threads: int | None = None) -> States:
     """States of cars (C, CAR_ROWS) driven by a road or posts, from equilibrium.
 
     The start is static equilibrium on the contact points' heights, at the initial speed.
+    threads : at most; as many as there are cores unless told
     """
-    states = np.zeros((len(cars), 16))
-    for car, state in zip(cars, states, strict=True):
-        state[:] = _free_rest(car, inputs)
-    states[:, 8] = inputs.initial_speed
+    out = np.zeros((len(cars), inputs.time.size, 16))
+    return _states(out, *_run(_free(inputs), cars, _free_start(cars, inputs), out, threads))
+
+
+def free_tallies(
+    cars: Array, inputs: FreeInputs, reduced: Reduction, threads: int | None = None
+) -> Tallies:
+    """The same without keeping states."""
+    start, values = _free_start(cars, inputs), np.zeros((len(cars), reduced.columns))
+    return Tallies(values, *_tally(_free(inputs), cars, start, reduced, values, threads))
+
+
+def rims_states(cars: Array, inputs: RimsInputs, exact: bool, threads: int | None = None) -> States:
+    """States of cars (C, CAR_ROWS) at the nodes of prescribed rims; their arms are not kept."""
+    out = np.zeros((len(cars), inputs.node_time.size, 16))
+    start = _rims_start(cars, inputs)
+    return _states(out, *_run(_on_rims(inputs, exact), cars, start, out, threads))
+
+
+def rims_tallies(
+    cars: Array,
+    inputs: RimsInputs,
+    exact: bool,
+    reduced: Reduction,
+    threads: int | None = None,
+) -> Tallies:
+    """The same without keeping states; samples are the nodes."""
+    start, values = _rims_start(cars, inputs), np.zeros((len(cars), reduced.columns))
+    driven = _on_rims(inputs, exact)
+    return Tallies(values, *_tally(driven, cars, start, reduced, values, threads))
+
+
+def _free(inputs: FreeInputs) -> Callable:
+    """The kernel bound to what drives the free car."""
     road = inputs.road
 
-    def integrate(lanes, some_cars, some_states, out, failed, reach):
+    def integrate(lanes, cars, states, watch, out, failed, reach, tallies):
         integrate_free(
             lanes,
-            some_cars,
-            some_states,
+            cars,
+            states,
             inputs.stage_inputs,
             inputs.steps,
             inputs.samples,
             road.coefficients,
             road.start,
             road.spacing,
+            watch,
             out,
             failed,
             reach,
+            tallies,
         )
 
-    return _run(integrate, cars, states, inputs.time.size)
+    return integrate
 
 
-def rims_states(cars: Array, inputs: RimsInputs, exact: bool) -> States:
-    """States of cars (C, CAR_ROWS) at the nodes of prescribed rims; their arms are not kept."""
-    states = np.zeros((len(cars), 16))
-    for car, state in zip(cars, states, strict=True):
-        if inputs.start_state is None:
-            state[:] = _rims_rest(car, inputs.stage_inputs[0, 0])
-        else:
-            state[1:4], state[9:12] = inputs.start_state[:3], inputs.start_state[3:]
-    states[:, 8] = inputs.stage_inputs[0, 0, 13]
+def _on_rims(inputs: RimsInputs, exact: bool) -> Callable:
+    """The kernel bound to prescribed rims."""
     steps = np.diff(inputs.node_time)
     samples = np.arange(inputs.node_time.size)
 
-    def integrate(lanes, some_cars, some_states, out, failed, reach):
+    def integrate(lanes, cars, states, watch, out, failed, reach, tallies):
         integrate_rims(
             lanes,
-            some_cars,
-            some_states,
+            cars,
+            states,
             inputs.stage_inputs,
             steps,
             samples,
             1.0 if exact else 0.0,
+            watch,
             out,
             failed,
             reach,
+            tallies,
         )
 
-    return _run(integrate, cars, states, samples.size)
+    return integrate
+
+
+def _free_start(cars: Array, inputs: FreeInputs) -> Array:
+    """States (C, 16) of equilibrium on the first heights; on level ground that is the design
+    position of every car.
+    """
+    states = np.zeros((len(cars), 16))
+    x = _wheel_places(cars)[0]
+    heights = np.stack([inputs.road.height(k % 2, x[:, k]) for k in range(4)], axis=1)
+    uneven = np.any(heights + inputs.stage_inputs[0, 0, :4] != 0.0, axis=1)
+    for car in np.flatnonzero(uneven):
+        states[car] = _free_rest(cars[car], inputs)
+    states[:, 8] = inputs.initial_speed
+    return states
+
+
+def _rims_start(cars: Array, inputs: RimsInputs) -> Array:
+    """States (C, 16) of equilibrium on the wheels' first heights, or those given."""
+    states, first = np.zeros((len(cars), 16)), inputs.stage_inputs[0, 0]
+    if inputs.start_state is not None:
+        states[:, 1:4], states[:, 9:12] = inputs.start_state[:3], inputs.start_state[3:]
+    elif np.any(first[:4] != 0.0):
+        for car, state in zip(cars, states, strict=True):
+            state[:] = _rims_rest(car, first)
+    states[:, 8] = first[13]
+    return states
 
 
 def check_sound(states: States, car: int, time: Array, outputs: Callable[[int], Array]) -> None:
@@ -153,35 +222,70 @@ def check_sound(states: States, car: int, time: Array, outputs: Callable[[int], 
     )
 
 
-def _run(integrate: Callable, cars: Array, states: Array, samples: int) -> States:
-    """Integrate in one go, or for a batch in as many threads as there are cores."""
-    out = np.zeros((len(cars), samples, 16))
-    failed = np.full(len(cars), -1, dtype=np.int64)
-    reach = np.ones(len(cars))
-    lanes = ONE_CAR if len(cars) == 1 else BATCH
-    parts = _parts(len(cars), len(lanes))
-    if len(parts) == 1:
-        integrate(lanes, cars, states, out, failed, reach)
-    else:
-        with ThreadPoolExecutor(len(parts)) as pool:
-            list(
-                pool.map(
-                    lambda part: integrate(
-                        lanes, cars[part], states[part], out[part], failed[part], reach[part]
-                    ),
-                    parts,
-                )
-            )
-    for car, sample in enumerate(failed):
-        if sample >= 0:
-            out[car, sample:] = np.nan
+def _states(out: Array, failed: NDArray[np.int64], reach: Array) -> States:
+    """Nothing is known of a car from its failure on."""
+    for car in np.flatnonzero(failed >= 0):
+        out[car, failed[car] :] = np.nan
     return States(out, failed, reach)
 
 
-def _parts(cars: int, lanes: int) -> Sequence[slice]:
-    """Slices of whole groups of lanes, one for each core that has work."""
+def _run(
+    integrate: Callable, cars: Array, start: Array, out: Array, threads: int | None
+) -> tuple[NDArray[np.int64], Array]:
+    """Integrate and keep states; returns first failures and reaches."""
+    lanes = ONE_CAR if len(cars) == 1 else BATCH
+    nothing = np.zeros((len(cars), 0))
+    return _in_threads(integrate, lanes, cars, start, NOTHING, out, nothing, threads)
+
+
+def _tally(
+    integrate: Callable,
+    cars: Array,
+    start: Array,
+    reduced: Reduction,
+    values: Array,
+    threads: int | None,
+) -> tuple[NDArray[np.int64], Array]:
+    """Integrate and tally; returns first failures and reaches."""
+    nothing = np.zeros((len(cars), 0, 16))
+    return _in_threads(integrate, BATCH, cars, start, reduced.watch, nothing, values, threads)
+
+
+def _in_threads(
+    integrate: Callable,
+    lanes: tuple[int, ...],
+    cars: Array,
+    start: Array,
+    watch: Watch,
+    out: Array,
+    tallies: Array,
+    threads: int | None,
+) -> tuple[NDArray[np.int64], Array]:
+    """One call, or for more cars than lanes one in each of some threads."""
+    failed, reach = np.full(len(cars), -1, dtype=np.int64), np.ones(len(cars))
+
+    def run(part: slice) -> None:
+        rows = cars[part], start[part]
+        integrate(lanes, *rows, watch, out[part], failed[part], reach[part], tallies[part])
+
+    parts = _parts(len(cars), len(lanes), threads)
+    if len(parts) == 1:
+        run(parts[0])
+    else:
+        with ThreadPoolExecutor(len(parts)) as pool:
+            list(pool.map(run, parts))
+    return failed, reach
+
+
+def cores() -> int:
+    """Processor cores that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def _parts(cars: int, lanes: int, threads: int | None) -> Sequence[slice]:
+    """Slices of whole groups of lanes, one for each thread that has work."""
     groups = -(-cars // lanes)
-    threads = min(len(os.sched_getaffinity(0)), groups)
+    threads = min(threads or cores(), groups)
     edges = np.linspace(0, groups, threads + 1).astype(int) * lanes
     return [slice(a, b) for a, b in zip(edges[:-1], np.minimum(edges[1:], cars), strict=True)]
 
@@ -235,12 +339,17 @@ def _rims_rest(car: Array, first: Array) -> Array:
 
 def _plane(car: Array, heights: Array) -> Array:
     """z, pitch and roll of a rigid car whose wheel centres come nearest to four heights."""
-    corners = car[BODY_ROWS:].reshape(4, -1)
-    of = Corner._fields.index
-    x = corners[:, of("pivot_x")] + corners[:, of("arm_x")]
-    y = corners[:, of("pivot_y")]
+    x, y = _wheel_places(car)
     plane = np.column_stack([np.ones(4), -x, y])
     return np.asarray(np.linalg.lstsq(plane, heights, rcond=None)[0], dtype=np.float64)
+
+
+def _wheel_places(cars: Array) -> tuple[Array, Array]:
+    """x and y (..., 4) of the wheel centres at rest from the CG, m, of cars (..., CAR_ROWS)."""
+    corners = cars[..., BODY_ROWS:].reshape(*cars.shape[:-1], 4, -1)
+    of = Corner._fields.index
+    x = corners[..., of("pivot_x")] + corners[..., of("arm_x")]
+    return x, corners[..., of("pivot_y")]
 
 
 def _rest(accelerations: Callable[[Array], Array], guess: Array) -> Array:

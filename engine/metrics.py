@@ -36,6 +36,9 @@ COMFORT = (
 """Upper ends (m/s2) of the bands of ISO 2631-1, annex C; they overlap there and are cut here at
 the beginning of the next worse band."""
 
+PERCENTILES = (1, 99)
+"""Of travel and tyre load, in %: what all but the worst hundredth of the time needs."""
+
 AXLE_WORDS: dict[AxleName, str] = {"front": "Front", "rear": "Rear"}
 
 
@@ -139,20 +142,30 @@ def _pitch_peaks(run: Run, degrees: tuple[str, str, float]) -> Iterator[Metric]:
         )
 
 
+def pushes(run: Run) -> dict[str, NDArray[np.bool_]]:
+    """Which samples lie in the time in which the car squats and dives, as far as it does.
+
+    It accelerates or brakes then at over half its most.
+    """
+    if "chassis.a_x" not in run:
+        return {}
+    slow = smoothed(run.time, run["chassis.a_x"], SLOW)
+    both = {"squat": slow, "dive": -slow}
+    return {
+        name: push > 0.5 * np.max(push) for name, push in both.items() if np.max(push) >= LEAST_PUSH
+    }
+
+
 def _squat(run: Run, degrees: tuple[str, str, float]) -> Iterator[Metric]:
     """Mean pitch while the car accelerates or brakes, in which the road's share averages out."""
-    if "chassis.a_x" not in run:
-        return
-    slow = smoothed(run.time, run["chassis.a_x"], SLOW)
+    during = pushes(run)
     for name, label, sign, doing in (
         ("squat", "Squat", 1.0, "accelerates"),
         ("dive", "Dive", -1.0, "brakes"),
     ):
-        push = sign * slow
-        if np.max(push) < LEAST_PUSH:
+        if name not in during:
             continue
-        during = push > 0.5 * np.max(push)
-        mean = float(np.mean(-sign * run["chassis.pitch"][during]))
+        mean = float(np.mean(-sign * run["chassis.pitch"][during[name]]))
         side = "up" if name == "squat" else "down"
         meaning = f"mean pitch nose {side} while the car {doing} at over half its most"
         yield Metric(f"chassis.pitch.{name}", f"{label}, mean", mean, *degrees, meaning)
@@ -183,6 +196,7 @@ def _travel(run: Run) -> Iterator[Metric]:
             *units,
             "greatest extension from rest",
         )
+        yield from _percentiles(f"suspension.{axle}.travel", label, travels, units)
 
 
 def _tyre_load(run: Run) -> Iterator[Metric]:
@@ -212,6 +226,30 @@ def _tyre_load(run: Run) -> Iterator[Metric]:
             *("1", "%", 100.0),
             "share of the samples in which a tyre carries nothing",
         )
+        for name, value in (("least", np.min(loads)), ("most", np.max(loads))):
+            yield Metric(
+                f"tyre.{axle}.load.{name}",
+                f"{label}, {name}",
+                float(value),
+                *("N", "N", 1.0),
+                "of both wheels at any time",
+            )
+        yield from _percentiles(f"tyre.{axle}.load", label, loads, ("N", "N", 1.0))
+
+
+def percentile_name(channel: str, percentile: int) -> str:
+    """Name of a percentile's row."""
+    return f"{channel}.p{percentile:02d}"
+
+
+def _percentiles(
+    channel: str, label: str, pair: Array, units: tuple[str, str, float]
+) -> Iterator[Metric]:
+    """What both wheels together stay above and below for all but a hundredth of the time."""
+    for percentile, value in zip(PERCENTILES, np.percentile(pair, PERCENTILES), strict=True):
+        below = f"both wheels together are below it {percentile} % of the time"
+        name = percentile_name(channel, percentile)
+        yield Metric(name, f"{label}, {percentile} % below", float(value), *units, below)
 
 
 def _axles(run: Run, channel_of: Callable[[str], str]) -> Iterator[tuple[AxleName, Array]]:

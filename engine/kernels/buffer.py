@@ -29,8 +29,13 @@ TURNS = CONTACT + 8
 TURN_ROWS = len(Turn._fields)
 REACH = TURNS + 6 * TURN_ROWS
 """Least reach of an arm and least clearance of a mount since the beginning."""
-CAR = REACH + 1
+TRAVELS = REACH + 1
+"""Of the four struts at the stage, m."""
+LOADS = TRAVELS + 4
+"""Of the four tyres, N."""
+CAR = LOADS + 4
 ROWS = CAR + CAR_ROWS
+"""Rows of the equations of motion; those of `weighing.py` and `tally.py` follow."""
 
 _load_body, _load_corner, _load_given = loader(Body), loader(Corner), loader(WheelInput)
 _load_state, _store_state = loader(State), storer(State)
@@ -71,6 +76,20 @@ def keep_turn(buffer, index, LANES, lane, turn):
 def stage_state(buffer, LANES, lane):
     """State of a lane's car at the stage."""
     return _load_state(buffer, STAGE, LANES, lane)
+
+
+@inlined
+def slope_at(buffer, LANES, lane):
+    """Derivative of a lane's state at the stage."""
+    return _load_state(buffer, SLOPE, LANES, lane)
+
+
+@inlined
+def keep_wheels(buffer, LANES, lane, travels, loads):
+    """Store what is tallied of a lane's four wheels."""
+    for corner in range(4):
+        buffer[(TRAVELS + corner) * LANES + lane] = travels[corner]
+        buffer[(LOADS + corner) * LANES + lane] = loads[corner]
 
 
 @inlined

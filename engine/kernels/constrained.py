@@ -56,6 +56,7 @@ class RimCorner(NamedTuple):
     """S without the bar"""
     reach: float
     """Positive while the wheel centre can reach its prescribed height."""
+    travel: float
     clearance: float
     """Of the spring-damper's mount."""
 
@@ -172,6 +173,7 @@ def rim_corner(corner, chassis, z, z_rate, rim, direction, braking):
         share * back_arm + torque,
         element.moment,
         reach,
+        element.travel,
         element.clearance,
     )
 

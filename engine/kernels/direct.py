@@ -34,6 +34,7 @@ class FreeCorner(NamedTuple):
     on_chassis: Quad
     moment: float
     """On the arm about its pivot, from tyre, spring-damper, drive and brake."""
+    travel: float
     clearance: float
     """Of the spring-damper's mount."""
 
@@ -58,7 +59,17 @@ def free_corner(corner, chassis: Attitude, state, arm, given, direction):
     element = strut(corner, wheel.arm, arm)
     moment = on_arm + torque + element.moment
     equation = arm_equation(corner, chassis, arm)
-    return FreeCorner(arm, wheel, equation, force_X, load, on_chassis, moment, element.clearance)
+    return FreeCorner(
+        arm,
+        wheel,
+        equation,
+        force_X,
+        load,
+        on_chassis,
+        moment,
+        element.travel,
+        element.clearance,
+    )
 
 
 @inlined

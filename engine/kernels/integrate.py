@@ -1,8 +1,8 @@
 """Classical Runge-Kutta of order 4 over a batch of cars, for the free car and for given rims.
 
 Each step k has its own length and three sets of inputs: at its beginning, middle and end, seen
-from inside the step, so that a jump of the torque between two steps costs no order. Only the
-states asked for are kept.
+from inside the step, so that a jump of the torque between two steps costs no order. States are
+kept at the samples, or tallied there, or both.
 """
 
 import numpy as np
@@ -13,7 +13,6 @@ from .buffer import (
     CAR_ROWS,
     NOW,
     REACH,
-    ROWS,
     SLOPE,
     STAGE,
     STATES,
@@ -22,6 +21,8 @@ from .buffer import (
     corner_of,
     given_to,
     keep_slope,
+    keep_turn,
+    keep_wheels,
     stage_state,
     turn_of,
 )
@@ -29,8 +30,11 @@ from .constrained import rim_accelerations, rim_corner
 from .contact import find_contacts, read_road
 from .direct import accelerations, free_corner
 from .forces import direction_of_travel
+from .histogram import BINS, QUANTITIES, percentiles
 from .kinematics import arm_pose, attitude, turn_by
 from .records import RimInput, State
+from .tally import TALLY_END, TALLY_ROWS, clear_tally, keep_tally, tally
+from .weighing import set_filters, watch_point, weigh
 
 _ANGLE_LIMIT = 1.5
 """rad: beyond it the polynomials of elementary.py lose accuracy and the car lies on its side."""
@@ -97,6 +101,8 @@ def car_on_rims(buffer, LANES, j, rims, a_x, way, b, exact):
     """Attitude, corners and accelerations of a lane's car on its rims at the stage."""
     state = stage_state(buffer, LANES, j)
     pitch, roll = turn_by(state.pitch), turn_by(state.roll)
+    keep_turn(buffer, 0, LANES, j, pitch)
+    keep_turn(buffer, 1, LANES, j, roll)
     chassis = attitude(pitch, roll, state.pitch_rate, state.roll_rate)
     z, z_rate = state.z, state.z_rate
     fl = rim_corner(corner_of(buffer, 0, LANES, j), chassis, z, z_rate, rims[0], way, b)
@@ -108,27 +114,40 @@ def car_on_rims(buffer, LANES, j, rims, a_x, way, b, exact):
 
 
 @inlined
-def _free_slopes(buffer, LANES):
-    """Derivative of every lane's stage state, free car."""
+def _free_slopes(buffer, LANES, given, driven):
+    """Derivative of every lane's stage state, free car.
+
+    given (16,) : row of stage inputs; driven : road, its start and spacing
+    """
+    road, start, spacing = driven
+    find_contacts(buffer, LANES)
+    read_road(buffer, LANES, given, road, start, spacing)
     for j in range(LANES):
         _, fl, fr, rl, rr, a = free_car(buffer, LANES, j)
         clearance = min(min(fl.clearance, fr.clearance), min(rl.clearance, rr.clearance))
         buffer[REACH * LANES + j] = min(buffer[REACH * LANES + j], clearance)
+        travels = (fl.travel, fr.travel, rl.travel, rr.travel)
+        keep_wheels(buffer, LANES, j, travels, (fl.load, fr.load, rl.load, rr.load))
         slope = slope_of(stage_state(buffer, LANES, j), a.chassis, a.fl, a.fr, a.rl, a.rr)
         keep_slope(buffer, LANES, j, slope)
 
 
 @inlined
-def _rim_slopes(buffer, LANES, u, exact):
-    """Derivative of every lane's stage state, prescribed rims; u : one row of stage inputs."""
+def _rim_slopes(buffer, LANES, given, driven):
+    """Derivative of every lane's stage state, prescribed rims.
+
+    given (15,) : row of stage inputs; driven : exact, 1.0 or 0.0
+    """
     # Read before the loop: a second array inside it might alias the buffer.
-    rims = rims_at(u)
-    a_x, way, b = u[12], direction_of_travel(u[13]), u[14]
+    rims = rims_at(given)
+    a_x, way, b = given[12], direction_of_travel(given[13]), given[14]
     for j in range(LANES):
-        _, fl, fr, rl, rr, a = car_on_rims(buffer, LANES, j, rims, a_x, way, b, exact)
+        _, fl, fr, rl, rr, a = car_on_rims(buffer, LANES, j, rims, a_x, way, b, driven[0])
         reach = min(min(fl.reach, fr.reach), min(rl.reach, rr.reach))
         clearance = min(min(fl.clearance, fr.clearance), min(rl.clearance, rr.clearance))
         buffer[REACH * LANES + j] = min(buffer[REACH * LANES + j], min(reach, clearance))
+        travels = (fl.travel, fr.travel, rl.travel, rr.travel)
+        keep_wheels(buffer, LANES, j, travels, (a.fl_load, a.fr_load, a.rl_load, a.rr_load))
         # The arms follow from the chassis; their rows are not integrated.
         slope = slope_of(stage_state(buffer, LANES, j), a.chassis, 0.0, 0.0, 0.0, 0.0)
         keep_slope(buffer, LANES, j, slope)
@@ -170,15 +189,12 @@ def _advance(buffer, LANES, stage, h):
 
 
 @inlined
-def _keep(buffer, LANES, states_out, failed, reach, first, sample):
-    """Write the lanes' states as a sample; note the cars that have left the model's range.
-
-    Returns whether any car is still sound.
-    """
+def _check(buffer, LANES, failed, reach, first, sample):
+    """Note the cars that have left the model's range; returns whether any is still sound."""
     sound_left = False
     for j in range(LANES):
         car = first + j
-        if car < states_out.shape[0]:
+        if car < failed.shape[0]:
             sound = abs(buffer[1 * LANES + j]) < _HEIGHT_LIMIT and buffer[REACH * LANES + j] >= 0.0
             for row in range(2, 8):
                 sound = sound and abs(buffer[row * LANES + j]) < _ANGLE_LIMIT
@@ -186,9 +202,17 @@ def _keep(buffer, LANES, states_out, failed, reach, first, sample):
                 failed[car] = sample
                 reach[car] = buffer[REACH * LANES + j]
             sound_left = sound_left or sound
-            for row in range(STATES):
-                states_out[car, sample, row] = buffer[row * LANES + j]
     return sound_left
+
+
+@inlined
+def _keep(buffer, LANES, out, first, sample):
+    """Write the lanes' states as a sample."""
+    for j in range(LANES):
+        car = first + j
+        if car < out.shape[0]:
+            for row in range(STATES):
+                out[car, sample, row] = buffer[row * LANES + j]
 
 
 @inlined
@@ -199,9 +223,71 @@ def _stages(inputs):
     return inputs.shape[1] + 1
 
 
+@inlined
+def _integrate(
+    slopes, driven, lanes, cars, states, inputs, steps, samples, watch, out, failed, reach, tallies
+):
+    """Drive every car; slopes (buffer, LANES, row of stage inputs, driven) finds derivatives."""
+    LANES = len(lanes)
+    buffer = np.zeros(TALLY_END * LANES)
+    # A car by itself is not tallied, which spares compiling it.
+    keeping, tallying = out.shape[1] > 0, LANES > 1 and tallies.shape[1] > 0
+    ring = np.zeros((watch.window, LANES))
+    counts = np.zeros((QUANTITIES, BINS if tallying else 0, LANES), dtype=np.int32)
+    last, kind = steps.shape[0], -1
+    for first in range(0, cars.shape[0], LANES):
+        _begin(buffer, LANES, cars, states, first)
+        if tallying:
+            ring[:] = 0.0
+            counts[:] = 0
+            clear_tally(buffer, LANES)
+        for k in range(last + 1):
+            sample = samples[k]
+            if sample >= 0:
+                if not _check(buffer, LANES, failed, reach, first, sample):
+                    break
+                if keeping:
+                    _keep(buffer, LANES, out, first, sample)
+            if k == last and not tallying:
+                break
+            _set_out(buffer, LANES)
+            if tallying and k < last and watch.kinds[k] != kind:
+                kind = watch.kinds[k]
+                set_filters(buffer, LANES, watch, kind)
+            # The last sample's accelerations take one more stage.
+            step, stages = (k, _stages(inputs)) if k < last else (k - 1, 1)
+            for stage in range(stages):
+                given = inputs[step, (stage + 1) // 2 if k < last else 2]
+                slopes(buffer, LANES, given, driven)
+                if tallying:
+                    watch_point(buffer, LANES, stage, watch.point)
+                    if stage == 0 and sample >= 0:
+                        tally(buffer, LANES, watch, sample, ring, counts)
+                _advance(buffer, LANES, stage, steps[step])
+            if tallying:
+                weigh(buffer, LANES)
+        if tallying:
+            for j in range(min(LANES, cars.shape[0] - first)):
+                keep_tally(buffer, LANES, j, tallies[first + j])
+                percentiles(buffer, LANES, j, counts, watch.shares, tallies[first + j, TALLY_ROWS:])
+
+
 @compiled
 def integrate_free(
-    lanes, cars, states, inputs, steps, samples, road, start, spacing, out, failed, reach
+    lanes,
+    cars,
+    states,
+    inputs,
+    steps,
+    samples,
+    road,
+    start,
+    spacing,
+    watch,
+    out,
+    failed,
+    reach,
+    tallies,
 ):
     """Road and posts modes.
 
@@ -211,50 +297,55 @@ def integrate_free(
     inputs (n, 3, 16) : post heights (4), their rates (4), drive torques (4), brake torques (4)
         at the beginning, middle and end of each step
     steps (n,) : step lengths, s
-    samples (n + 1,) : index into `out` of the state before step k, or -1
+    samples (n + 1,) : index of the sample before step k, or -1
     road (2, cells, 4), start, spacing : cubics of `road.Road`, left and right
-    out (C, S, 16) : states at the samples
+    watch : `Watch` of what is tallied
+    out (C, S, 16) : states at the samples, or (C, 0, 16) where they are not kept
     failed (C,) : set to the first sample at which a car left the model's range, else left alone
     reach (C,) : likewise to the least reach of its arms and clearance of its mounts until then
+    tallies (C, TALLY_ROWS + QUANTITIES P) : rows of `tally.py` and percentiles, or (C, 0)
     """
-    LANES = len(lanes)
-    buffer = np.zeros(ROWS * LANES)
-    for first in range(0, cars.shape[0], LANES):
-        _begin(buffer, LANES, cars, states, first)
-        if samples[0] >= 0:
-            _keep(buffer, LANES, out, failed, reach, first, samples[0])
-        for k in range(steps.shape[0]):
-            _set_out(buffer, LANES)
-            for stage in range(_stages(inputs)):
-                given = inputs[k, (stage + 1) // 2]
-                find_contacts(buffer, LANES)
-                read_road(buffer, LANES, given, road, start, spacing)
-                _free_slopes(buffer, LANES)
-                _advance(buffer, LANES, stage, steps[k])
-            sample = samples[k + 1]
-            if sample >= 0 and not _keep(buffer, LANES, out, failed, reach, first, sample):
-                break
+    driven = (road, start, spacing)
+    _integrate(
+        _free_slopes,
+        driven,
+        lanes,
+        cars,
+        states,
+        inputs,
+        steps,
+        samples,
+        watch,
+        out,
+        failed,
+        reach,
+        tallies,
+    )
 
 
 @compiled
-def integrate_rims(lanes, cars, states, inputs, steps, samples, exact, out, failed, reach):
+def integrate_rims(
+    lanes, cars, states, inputs, steps, samples, exact, watch, out, failed, reach, tallies
+):
     """Rims mode; arguments as in `integrate_free`, but
 
     inputs (n, 3, 15) : u (4), u' (4), u'' (4), a_x, v_x and the braking weight b
     exact : 1.0 for the exact traction, 0.0 for the paper's
     out : x, z, pitch, roll and their rates are valid; the arms follow from them
     """
-    LANES = len(lanes)
-    buffer = np.zeros(ROWS * LANES)
-    for first in range(0, cars.shape[0], LANES):
-        _begin(buffer, LANES, cars, states, first)
-        if samples[0] >= 0:
-            _keep(buffer, LANES, out, failed, reach, first, samples[0])
-        for k in range(steps.shape[0]):
-            _set_out(buffer, LANES)
-            for stage in range(_stages(inputs)):
-                _rim_slopes(buffer, LANES, inputs[k, (stage + 1) // 2], exact)
-                _advance(buffer, LANES, stage, steps[k])
-            sample = samples[k + 1]
-            if sample >= 0 and not _keep(buffer, LANES, out, failed, reach, first, sample):
-                break
+    driven = (exact,)
+    _integrate(
+        _rim_slopes,
+        driven,
+        lanes,
+        cars,
+        states,
+        inputs,
+        steps,
+        samples,
+        watch,
+        out,
+        failed,
+        reach,
+        tallies,
+    )

@@ -1,0 +1,147 @@
+"""Figures tallied in the kernels against those of the same car's history."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from ridetune.engine.car_rows import car_rows
+from ridetune.engine.integration import free_states, free_tallies, rims_states, rims_tallies
+from ridetune.engine.kernels.histogram import BINS, LOAD_FROM, LOAD_TO, TRAVEL_FROM, TRAVEL_TO
+from ridetune.engine.manoeuvre import reference_manoeuvres
+from ridetune.engine.metrics import metrics
+from ridetune.engine.output_channels import DEFAULT_POINTS
+from ridetune.engine.reductions import figures, reduction
+from ridetune.engine.rims import prepare
+from ridetune.engine.simulation import (
+    FREE_STEP,
+    SAMPLE_STEP,
+    simulate_posts,
+    simulate_rims,
+    simulate_road,
+)
+from ridetune.engine.stepping import prepare_free
+
+from ..factories import paper_vehicle, random_vehicle
+
+[(POINT, POSITION)] = DEFAULT_POINTS.items()
+
+WEIGHTING_ERROR = 5e-4
+"""Of a parabola through instants h = 1.25 ms apart, (w h)^3 / 12 at the wheels' 15 Hz, and of the
+spectrum of 5 ms samples, into which falls what lies above 100 Hz."""
+
+NO_MOTION = 1e-12
+"""m/s2, m, rad: what is left of a motion that symmetry forbids."""
+
+
+def cars_of(count):
+    rng = np.random.default_rng(12)
+    return [paper_vehicle(), *(random_vehicle(rng, braked=True) for _ in range(count - 1))]
+
+
+def compare(found, run, vehicle):
+    """Each figure beside that of the history; percentiles lie in the same bin or the next."""
+    expected = {metric.name: metric.value for metric in metrics(run)}
+    assert list(found) == list(expected)
+    for name, value in expected.items():
+        axle = vehicle.front if ".front." in name else vehicle.rear
+        if name.endswith((".p01", ".p99")) and "travel" in name:
+            width = axle.suspension.mount_height * (TRAVEL_TO - TRAVEL_FROM) / BINS
+            assert_allclose(found[name], value, rtol=0, atol=2.0 * width, err_msg=name)
+        elif name.endswith((".p01", ".p99")):
+            width = np.mean(run[name[:4] + "." + name[5] + "l.load"][:1]) * (LOAD_TO - LOAD_FROM)
+            assert_allclose(found[name], value, rtol=0, atol=2.0 * width / BINS, err_msg=name)
+        elif ".a_" in name:
+            assert_allclose(found[name], value, rtol=WEIGHTING_ERROR, atol=NO_MOTION, err_msg=name)
+        elif name.endswith("coefficient"):
+            # Over the mean of the samples there, over the mean in time here: the ends weigh half.
+            assert_allclose(found[name], value, rtol=2.0 / run.time.size, err_msg=name)
+        else:
+            assert_allclose(found[name], value, rtol=1e-9, atol=NO_MOTION, err_msg=name)
+
+
+@pytest.mark.parametrize("manoeuvre", ["2", "brake", "bump", "heave"])
+def test_tallied_figures_are_those_of_each_car_s_history(manoeuvre):
+    """Oracle: `metrics` of the car simulated alone, the first one's times of squat and dive."""
+    driven = reference_manoeuvres()[manoeuvre]
+    vehicle = paper_vehicle() if manoeuvre != "brake" else cars_of(2)[1]
+    simulate = simulate_road if driven.kind == "road" else simulate_posts
+    run = simulate(vehicle, driven).run
+    inputs = prepare_free(driven.demand(vehicle), FREE_STEP, SAMPLE_STEP)
+    reduced = reduction(run, inputs.steps, POINT, POSITION)
+    found = figures(free_tallies(car_rows([vehicle]), inputs, reduced).values, reduced)
+    compare({name: values[0] for name, values in found.items()}, run, vehicle)
+
+
+def test_tallied_figures_on_rims_are_those_of_the_history():
+    """Oracle: as above, where nodes and samples coincide."""
+    vehicle = paper_vehicle()
+    recording = simulate_road(vehicle, replace(reference_manoeuvres()["2"], duration=8.0)).run
+    other = vehicle.with_values({"front.suspension.damping": 900.0})
+    inputs = prepare(recording, other)
+    run = simulate_rims(other, recording).run
+    reduced = reduction(run, np.diff(inputs.node_time), POINT, POSITION)
+    tallies = rims_tallies(car_rows([other]), inputs, True, reduced)
+    found = figures(tallies.values, reduced)
+    compare({name: values[0] for name, values in found.items()}, run, other)
+
+
+@pytest.fixture(scope="module")
+def short():
+    return replace(reference_manoeuvres()["bump"], duration=2.0)
+
+
+def random_rows(count):
+    """Cars of one kind whose numbers differ."""
+    rng, vehicle = np.random.default_rng(5), paper_vehicle()
+    names = ("front.suspension.stiffness", "rear.suspension.damping", "rear.pivot.distance")
+    values = rng.uniform([15e3, 800.0, 0.6], [40e3, 3000.0, 2.0], (count, 3))
+    return car_rows([vehicle.with_values(dict(zip(names, row, strict=True))) for row in values])
+
+
+@pytest.mark.parametrize("count", [1, 7, 8, 9, 64, 1000])
+def test_each_car_of_a_batch_is_that_car_alone(short, count):
+    """Oracle: the same car in a batch of one to the last bit, whatever its lane and thread, and
+    simulated as a single car to 11 digits of the coordinates' range: there, products are fused
+    with other sums."""
+    vehicle, rows = paper_vehicle(), random_rows(count)
+    inputs = prepare_free(short.demand(vehicle), FREE_STEP, SAMPLE_STEP)
+    run = simulate_road(vehicle, short).run
+    reduced = reduction(run, inputs.steps, POINT, POSITION)
+    together = free_tallies(rows, inputs, reduced)
+    one_thread = free_tallies(rows, inputs, reduced, threads=1)
+    assert np.array_equal(together.values, one_thread.values)
+    states = free_states(rows, inputs).values
+    assert np.array_equal(states, free_states(rows, inputs, threads=1).values)
+    for k in {0, count // 2, count - 1}:
+        alone = free_tallies(rows[k : k + 1], inputs, reduced)
+        assert np.array_equal(alone.values[0], together.values[k])
+        single = free_states(rows[k : k + 1], inputs).values[0]
+        scale = np.ptp(single, axis=0)
+        assert np.all(np.abs(states[k] - single) <= 1e-11 * scale + 1e-14)
+
+
+@pytest.mark.parametrize("count", [1, 7, 8, 9, 64, 1000])
+def test_each_car_of_a_batch_on_rims_is_that_car_alone(short, count):
+    """Oracle: as above."""
+    vehicle, rows = paper_vehicle(), random_rows(count)
+    inputs = prepare(simulate_road(vehicle, short).run, vehicle)
+    states = rims_states(rows, inputs, True).values
+    assert np.array_equal(states, rims_states(rows, inputs, True, threads=1).values)
+    for k in {0, count // 2, count - 1}:
+        single = rims_states(rows[k : k + 1], inputs, True).values[0]
+        scale = np.ptp(single, axis=0)
+        assert np.all(np.abs(states[k] - single) <= 1e-11 * scale + 1e-14)
+
+
+def test_a_failed_car_spoils_neither_its_batch_nor_the_next(short):
+    """Oracle: the sound cars alone. The lanes of a car that diverged are used again."""
+    vehicle, rows = paper_vehicle(), random_rows(24)
+    inputs = prepare_free(short.demand(vehicle), FREE_STEP, SAMPLE_STEP)
+    reduced = reduction(simulate_road(vehicle, short).run, inputs.steps, POINT, POSITION)
+    sound = free_tallies(rows, inputs, reduced, threads=1)
+    broken = car_rows([vehicle.with_values({"front.suspension.damping": 1e5})])
+    mixed = np.insert(rows, 3, broken[0], axis=0)
+    found = free_tallies(mixed, inputs, reduced, threads=1)
+    assert found.failed[3] >= 0
+    assert np.array_equal(np.delete(found.values, 3, axis=0), sound.values)
