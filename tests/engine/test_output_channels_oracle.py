@@ -7,13 +7,14 @@ The tolerance is round-off of the largest force or acceleration.
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from ridetune.app.bench.mujoco_tree import CORNERS
 from ridetune.engine.car_rows import car_row
 from ridetune.engine.integration import free_outputs, rims_outputs
 from ridetune.engine.output_channels import common_channels
 from ridetune.engine.road import Road
 
 from ..factories import random_rims_state, random_road_state, random_vehicle
-from ..oracles.car_tree import CORNERS, about_x, about_y
+from ..oracles.car_tree import about_x, about_y
 from ..oracles.mujoco_car import MujocoCar
 from ..single_state import rims_accelerations
 

@@ -10,8 +10,9 @@ of the same equation. Nothing here knows how the engine eliminates, orders or si
 """
 
 import numpy as np
+from ridetune.app.bench.mujoco_tree import CORNERS, GRAVITY
 
-from .car_tree import CORNERS, EX, EY, EZ, GRAVITY, PITCH, ROLL, CarTree, X, about_x, about_y
+from .car_tree import EX, EY, EZ, PITCH, ROLL, CarTree, X, about_x, about_y
 
 REST_SPEED = 0.1
 

@@ -7,6 +7,7 @@ documented ones; the tree, its energies and its Jacobians are checked by other m
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from ridetune.app.bench.mujoco_tree import CORNERS, GRAVITY
 from scipy.optimize import root
 
 from ..factories import (
@@ -17,7 +18,6 @@ from ..factories import (
     random_road_state,
     random_vehicle,
 )
-from .car_tree import CORNERS, GRAVITY
 from .mujoco_car import MujocoCar
 
 STILL = {name: np.zeros(4) for name in ("road_height", "road_rate", "drive", "brake")}
