@@ -60,6 +60,7 @@ def command_line() -> "Parser":
     _describe_simulate(add("simulate", _simulate, "Simulate a car on a road, from rims or posts."))
     _describe_identify(add("identify", _identify, "Identify a car's parameters from recordings."))
     _describe_campaign(add("campaign", _campaign, "Make the two manoeuvres' measurement files."))
+    _describe_bench(add("bench", _bench, "Measure the engine and its peers on this machine."))
     return parser
 
 
@@ -176,6 +177,16 @@ def _describe_campaign(command: Parser) -> None:
     command.add_argument("--force", action="store_true", help="write over files that are there")
 
 
+def _describe_bench(command: Parser) -> None:
+    command.add_argument(
+        "--only", metavar="NAME", nargs="+", action="extend", default=[], help="these rows alone"
+    )
+    command.add_argument(
+        "--quick", action="store_true", help="fewer repetitions, and no start-up rows"
+    )
+    command.add_argument("-o", "--output", metavar="FILE", help="the table as JSON")
+
+
 def _add_vehicle(command: Parser) -> None:
     command.add_argument(
         "--vehicle", metavar="FILE", required=True, help="vehicle or fit file, or a known car"
@@ -245,3 +256,9 @@ def _campaign(options: argparse.Namespace) -> None:
     from .commands.campaign import campaign
 
     campaign(options)
+
+
+def _bench(options: argparse.Namespace) -> None:
+    from .commands.bench import bench
+
+    bench(options)

@@ -104,6 +104,10 @@ def test_describing_the_commands_imports_no_engine():
         ("identify run.csv --vehicle paper --colour", "--colour"),
         ("campaign --plant detailed -o runs", "--plant concept"),
         ("campaign --noise n.toml -o runs", "n.toml"),
+        ("bench --only raod-one", "--only raod-one: there is no row of that name; did you mean"),
+        ("bench --only everything", "there are road-one, "),
+        ("bench --only", "--only"),
+        ("bench --quick -o none/bench.json", "there is no folder none"),
     ],
 )
 def test_bad_command_is_refused_in_one_line_that_names_the_place(folder, capsys, arguments, told):

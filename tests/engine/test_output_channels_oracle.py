@@ -7,7 +7,7 @@ The tolerance is round-off of the largest force or acceleration.
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.app.bench.mujoco_tree import CORNERS
+from ridetune.app.bench.car_points import CORNERS
 from ridetune.engine.car_rows import car_row
 from ridetune.engine.integration import free_outputs, rims_outputs
 from ridetune.engine.output_channels import common_channels

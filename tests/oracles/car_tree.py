@@ -3,12 +3,14 @@
 MuJoCo gives two things only, the mass matrix M(q) and the bias h(q, qd) (gravity, centrifugal and
 gyroscopic terms) of a tree of five bodies; points and energies are written out beside it.
 
-The tree and its points are those of `mujoco_tree`, which the benchmark shares; frame E is inertial.
+Tree and points are those of `mujoco_tree` and `car_points`, which the benchmark shares; frame E is
+inertial.
 """
 
 import mujoco
 import numpy as np
-from ridetune.app.bench.mujoco_tree import GRAVITY, corners_of, tree_of
+from ridetune.app.bench.car_points import GRAVITY, corners_of
+from ridetune.app.bench.mujoco_tree import tree_of
 
 X, Z, PITCH, ROLL = 0, 1, 2, 3
 EX, EY, EZ = np.eye(3)

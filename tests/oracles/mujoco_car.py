@@ -10,7 +10,7 @@ of the same equation. Nothing here knows how the engine eliminates, orders or si
 """
 
 import numpy as np
-from ridetune.app.bench.mujoco_tree import CORNERS, GRAVITY
+from ridetune.app.bench.car_points import CORNERS, GRAVITY
 
 from .car_tree import EX, EY, EZ, PITCH, ROLL, CarTree, X, about_x, about_y
 

@@ -7,7 +7,7 @@ documented ones; the tree, its energies and its Jacobians are checked by other m
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.app.bench.mujoco_tree import CORNERS, GRAVITY
+from ridetune.app.bench.car_points import CORNERS, GRAVITY
 from scipy.optimize import root
 
 from ..factories import (
