@@ -1,45 +1,62 @@
-"""Compile every kernel by calling each mode once; as a program, in a process of its own.
+"""Compile every kernel by calling each mode; as a program, one of two parts of them.
 
-`python -m ridetune.app.compile` fills the cache on disk and says what it is at. The service runs it
-so when the cache is cold: the compiler takes a minute and 200 MB, which the service would feel.
+`python -m ridetune.app.compile PART` fills the cache on disk. The service runs both parts side by
+side when the cache is cold, in processes of their own: the compiler takes half a minute and 200 MB
+each, which the service would feel.
 """
 
-from collections.abc import Callable
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-STEPS = ("the car on the road", "the car on the rig", "the car on its rims")
 
-
-def steps() -> dict[str, Callable[[], object]]:
-    """One short call of every mode, by name; compiles, or loads what has been compiled."""
+def _free() -> None:
+    """One car and a batch on the rig and on the road, which share their kernels."""
+    from ..engine.car_rows import car_rows
+    from ..engine.integration import free_states
     from ..engine.manoeuvre import reference_manoeuvres
-    from ..engine.rims import prepare
-    from ..engine.simulation import rims_batch, simulate_posts, simulate_rims, simulate_road
+    from ..engine.simulation import FREE_STEP, SAMPLE_STEP, simulate_posts
+    from ..engine.stepping import prepare_free
     from ..engine.vehicle_file import reference_vehicles
 
     car = reference_vehicles()["paper"]
-    rolling = replace(reference_manoeuvres()["coast"], duration=0.5)
     shaken = replace(reference_manoeuvres()["heave"], duration=0.5)
-
-    def on_its_rims() -> None:
-        driven = simulate_road(car, rolling).run
-        simulate_rims(car, driven, traction="exact")
-        simulate_rims(car, driven, traction="paper")
-        rims_batch([car, car], prepare(driven, car), "exact")
-
-    road, rig, rims = STEPS
-    return {
-        road: lambda: simulate_road(car, rolling),
-        rig: lambda: simulate_posts(car, shaken),
-        rims: on_its_rims,
-    }
+    simulate_posts(car, shaken)
+    free_states(car_rows([car, car]), prepare_free(shaken.demand(car), FREE_STEP, SAMPLE_STEP))
 
 
-def compile_all(tell: Callable[[str], None]) -> None:
-    """Take every step, saying which before each."""
-    for number, (what, step) in enumerate(steps().items(), start=1):
-        tell(f"Compiling {what} ({number} of {len(STEPS)}); the first start takes a minute or two.")
-        step()
+def _rims() -> None:
+    """One car and a batch on rims that stand still."""
+    import numpy as np
+
+    from ..engine.channels import INPUT_CHANNELS, Run
+    from ..engine.rims import prepare
+    from ..engine.simulation import rims_batch, simulate_rims
+    from ..engine.vehicle_file import reference_vehicles
+
+    car, time = reference_vehicles()["paper"], np.linspace(0.0, 0.5, 101)
+    still = Run("still", time, {name: np.zeros(time.size) for name in INPUT_CHANNELS})
+    simulate_rims(car, still)
+    rims_batch([car, car], prepare(still, car), "exact")
+
+
+PARTS: dict[str, Callable[[], None]] = {"free": _free, "rims": _rims}
+
+
+def start_compilers(environment: Mapping[str, str] | None = None) -> list[subprocess.Popen[bytes]]:
+    """One process for each part; environment : this one's unless told."""
+    program, silent = [sys.executable, "-m", load_all.__module__], subprocess.DEVNULL
+    return [
+        subprocess.Popen([*program, part], stdin=silent, stdout=silent, env=environment)
+        for part in PARTS
+    ]
+
+
+def load_all() -> None:
+    """Load every part, or compile it here if it is not in the cache."""
+    for part in PARTS.values():
+        part()
 
 
 def is_compiled() -> bool:
@@ -50,4 +67,4 @@ def is_compiled() -> bool:
 
 
 if __name__ == "__main__":
-    compile_all(lambda message: print(message, flush=True))
+    PARTS[sys.argv[1]]()

@@ -1,21 +1,22 @@
 """Make the kernels ready in the background while the page is already served.
 
-The first start on a machine compiles for up to a minute, later ones read the result from disk in
+The first start on a machine compiles for half a minute, later ones read the result from disk in
 about a second. Everything but simulating works meanwhile.
 """
 
 import logging
 import subprocess
-import sys
 import threading
 from collections.abc import Callable
 from typing import Literal
 
-from .compile import compile_all, is_compiled
+from .compile import PARTS, is_compiled, load_all, start_compilers
 from .errors import Compiling
 from .samples import sample_project
 
 log = logging.getLogger(__name__)
+
+FIRST_START = "Compiling the model; the first start takes half a minute, or somewhat more."
 
 State = Literal["compiling", "ready", "failed"]
 
@@ -26,10 +27,10 @@ class WarmUp:
     def __init__(self, work: "Callable[[WarmUp], object]"):
         self._work = work
         self.state: State = "compiling"
-        self.message = "Compiling the simulation; the first start takes a minute or two."
+        self.message = FIRST_START
         self._ended = threading.Event()
         self.closed = False
-        self._apart: subprocess.Popen[str] | None = None
+        self._apart: list[subprocess.Popen[bytes]] = []
         self._thread = threading.Thread(target=self._run, name="warm-up", daemon=True)
 
     def start(self) -> None:
@@ -53,21 +54,16 @@ class WarmUp:
     def close(self) -> None:
         """Stop waiting for it."""
         self.closed = True
-        if self._apart is not None:
-            self._apart.kill()
+        for compiler in self._apart:
+            compiler.kill()
         self._ended.set()
 
     def compile_apart(self) -> None:
-        """Compile in another process, so that this one stays small and quick to answer."""
-        with subprocess.Popen(
-            [sys.executable, "-m", compile_all.__module__],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            text=True,
-        ) as self._apart:
-            assert self._apart.stdout is not None
-            for line in self._apart.stdout:
-                self.tell(line.strip())
+        """Compile in processes of their own, so that this one stays small and quick to answer."""
+        self._apart = start_compilers()
+        for done, compiler in enumerate(self._apart):
+            self.tell(f"{FIRST_START} Done: {done} of {len(PARTS)} parts.")
+            compiler.wait()
 
     def _run(self) -> None:
         try:
@@ -89,4 +85,4 @@ def ready_to_simulate(warmup: WarmUp) -> None:
     if not is_compiled():
         warmup.compile_apart()
     if not warmup.closed:
-        compile_all(warmup.tell)
+        load_all()

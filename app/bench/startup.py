@@ -18,7 +18,7 @@ from .workbench import Workbench
 APP = compile.__name__.removesuffix(".compile")
 
 SERVE = f"from {APP}.cli import main; main()"
-SIMULATE = f"from {compile.__name__} import STEPS, steps; steps()[STEPS[0]]()"
+SIMULATE = f"from {compile.__name__} import PARTS; PARTS['free']()"
 
 PATIENCE = 300.0
 """Longest wait for a process or an answer, s."""
@@ -33,7 +33,11 @@ def importing(bench: Workbench) -> Row:
 def cold(_: Workbench) -> Row:
     """Every kernel, compiled into a folder of its own."""
     with tempfile.TemporaryDirectory() as folder:
-        seconds = _python("-m", compile.__name__, RIDETUNE_CACHE=folder)
+        began = time.perf_counter()
+        compilers = compile.start_compilers(_environment() | {"RIDETUNE_CACHE": folder})
+        for compiler in compilers:
+            compiler.wait(PATIENCE)
+        seconds = time.perf_counter() - began
     return Row("first start: every kernel compiled (once)", Timing((seconds,)))
 
 
@@ -54,12 +58,12 @@ def _repeated(bench: Workbench, once: Callable[[], float]) -> Timing:
     return Timing(tuple(once() for _ in range(bench.pace.fewest)))
 
 
-def _python(*arguments: str, **environment: str) -> float:
+def _python(*arguments: str) -> float:
     """Seconds of a Python process from its start to its end."""
     began = time.perf_counter()
     subprocess.run(
         [sys.executable, *arguments],
-        env=_environment() | environment,
+        env=_environment(),
         stdout=subprocess.DEVNULL,
         timeout=PATIENCE,
         check=True,

@@ -4,7 +4,7 @@ import time
 
 import psutil
 import pytest
-from ridetune.app.compile import STEPS, compile_all, is_compiled
+from ridetune.app.compile import PARTS, is_compiled, load_all
 from ridetune.app.errors import Compiling
 from ridetune.app.warmup import WarmUp
 
@@ -32,19 +32,19 @@ def test_a_failure_is_told_and_logged(caplog):
     assert "no compiler" in caplog.text
 
 
-def test_a_cold_cache_is_filled_by_another_process(monkeypatch):
-    """Its sentences become ours; afterwards the cache holds the kernels."""
+def test_a_cold_cache_is_filled_by_other_processes(monkeypatch):
+    """What they have done is told; afterwards the cache holds the kernels."""
     told: list[str] = []
     warmup = WarmUp(lambda warmup: warmup.compile_apart())
     monkeypatch.setattr(warmup, "tell", told.append)
     warmup.start()
     assert warmup.wait() is True
-    assert [message.split(" (")[0] for message in told] == [f"Compiling {what}" for what in STEPS]
+    assert [message.split(": ")[1] for message in told] == ["0 of 2 parts.", "1 of 2 parts."]
     assert is_compiled()
 
 
 def test_stopping_the_service_stops_the_compiler(monkeypatch, tmp_path):
-    """A cache of its own makes the other process compile for long; `close` does not wait for it."""
+    """A cache of its own makes the processes compile for long; `close` does not wait for them."""
     monkeypatch.setenv("RIDETUNE_CACHE", str(tmp_path))
     told: list[str] = []
     warmup = WarmUp(lambda warmup: warmup.compile_apart())
@@ -54,17 +54,16 @@ def test_stopping_the_service_stops_the_compiler(monkeypatch, tmp_path):
     while not told:
         assert time.monotonic() < deadline
         time.sleep(0.02)
-    (compiler,) = (
+    compilers = [
         child for child in psutil.Process().children() if "ridetune.app.compile" in child.cmdline()
-    )
+    ]
+    assert len(compilers) == len(PARTS)
     warmup.close()
     assert warmup.wait() is False
-    _, alive = psutil.wait_procs([compiler], timeout=10)
+    _, alive = psutil.wait_procs(compilers, timeout=10)
     assert alive == []
 
 
-def test_every_step_can_be_taken_again():
-    """Once more from the cache, here: what the service does after the other process."""
-    told: list[str] = []
-    compile_all(told.append)
-    assert len(told) == len(STEPS)
+def test_every_part_can_be_taken_again():
+    """Once more from the cache, here: what the service does after the other processes."""
+    load_all()
