@@ -13,7 +13,9 @@ from dataclasses import replace
 
 def _free() -> None:
     """One car and a batch on the rig and on the road, which share their kernels."""
-    from ..engine.car_rows import car_rows
+    import numpy as np
+
+    from ..engine.car_rows import car_row
     from ..engine.integration import free_states
     from ..engine.manoeuvre import reference_manoeuvres
     from ..engine.simulation import FREE_STEP, SAMPLE_STEP, simulate_posts
@@ -23,13 +25,15 @@ def _free() -> None:
     car = reference_vehicles()["paper"]
     shaken = replace(reference_manoeuvres()["heave"], duration=0.5)
     simulate_posts(car, shaken)
-    free_states(car_rows([car, car]), prepare_free(shaken.demand(car), FREE_STEP, SAMPLE_STEP))
+    cars = np.stack([car_row(car), car_row(car)])
+    free_states(cars, prepare_free(shaken.demand(car), FREE_STEP, SAMPLE_STEP))
 
 
 def _rims() -> None:
     """One car and a batch on rims that stand still."""
     import numpy as np
 
+    from ..engine.car_rows import car_row
     from ..engine.channels import INPUT_CHANNELS, Run
     from ..engine.rims import prepare
     from ..engine.simulation import rims_batch, simulate_rims
@@ -38,7 +42,8 @@ def _rims() -> None:
     car, time = reference_vehicles()["paper"], np.linspace(0.0, 0.5, 101)
     still = Run("still", time, {name: np.zeros(time.size) for name in INPUT_CHANNELS})
     simulate_rims(car, still)
-    rims_batch([car, car], prepare(still, car), "exact")
+    cars = np.stack([car_row(car), car_row(car)])
+    rims_batch(cars, prepare(still, car), "exact")
 
 
 PARTS: dict[str, Callable[[], None]] = {"free": _free, "rims": _rims}

@@ -1,19 +1,29 @@
-"""A vehicle as the kernels read it: one row of numbers, derived once before a simulation."""
+"""A vehicle as the kernels read it: one row of numbers, derived once before a simulation.
+
+The records are derived from a vehicle's numbers or, for many cars at once, from arrays of them
+(C,), by the same expressions.
+"""
 
 from collections.abc import Sequence
-from math import tan
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .equilibrium import static_loads
+from .equilibrium import StaticLoads, loads_at_rest, stands, static_loads
 from .frames import CORNERS, axle_of, side_of
 from .frames import Corner as CornerName
+from .kernels.buffer import CAR_ROWS
 from .kernels.records import Body, Corner
-from .vehicle import Vehicle
+from .vehicle import Vehicle, possible
+
+Array = NDArray[np.float64]
 
 NO_FLOOR = -1e300
 """Least tyre load without the lift-off option: none."""
+
+AT_ONCE = 2048
+"""Cars whose rows are written together: they stay in a core's cache, where one number of all of
+them is written after the other."""
 
 
 def body_record(vehicle: Vehicle) -> Body:
@@ -34,8 +44,10 @@ def body_record(vehicle: Vehicle) -> Body:
     )
 
 
-def corner_record(vehicle: Vehicle, corner: CornerName, lift_off: bool) -> Corner:
-    """One corner of a vehicle.
+def corner_record(
+    vehicle: Vehicle, corner: CornerName, loads: StaticLoads, lift_off: bool
+) -> Corner:
+    """One corner of a vehicle that stands on its static loads.
 
     Wheel centre at rest in B: (+l_f or -l_r, +-track/2, r - h); pivot: d towards the middle of
     the car from it, d tan(phi) above the ground (section "Bodies and geometry", docs/model.md).
@@ -47,9 +59,8 @@ def corner_record(vehicle: Vehicle, corner: CornerName, lift_off: bool) -> Corne
     wheel, suspension, tyre, pivot = axle.wheel, axle.suspension, axle.tyre, axle.pivot
     height = vehicle.chassis.cg_height
     wheel_x = axle.cg_distance if front else -axle.cg_distance
-    arm_x, arm_z = -inwards * pivot.distance, wheel.radius - pivot.distance * tan(pivot.angle)
+    arm_x, arm_z = -inwards * pivot.distance, wheel.radius - pivot.distance * np.tan(pivot.angle)
     offset_x, offset_y, offset_z = wheel.cg_offset
-    loads = static_loads(vehicle)
     brakes = vehicle.brakes
     front_share = brakes.front_share if brakes else 0.0
     driven = vehicle.driven_corners
@@ -85,12 +96,41 @@ def corner_record(vehicle: Vehicle, corner: CornerName, lift_off: bool) -> Corne
     )
 
 
-def car_row(vehicle: Vehicle, lift_off: bool = False) -> NDArray[np.float64]:
-    """Body and four corners of a vehicle as one row (CAR_ROWS,)."""
-    corners = [corner_record(vehicle, corner, lift_off) for corner in CORNERS]
-    return np.concatenate([body_record(vehicle), *corners])
+def car_row(vehicle: Vehicle, lift_off: bool = False) -> Array:
+    """Body and four corners of a vehicle as one row (CAR_ROWS,).
+
+    Raises VehicleError for a car that cannot stand at rest.
+    """
+    row = np.empty(CAR_ROWS)
+    _write(row, vehicle, static_loads(vehicle), lift_off)
+    return row
 
 
-def car_rows(vehicles: Sequence[Vehicle], lift_off: bool = False) -> NDArray[np.float64]:
-    """One row a vehicle (C, CAR_ROWS)."""
-    return np.array([car_row(vehicle, lift_off) for vehicle in vehicles])
+def car_rows(
+    vehicle: Vehicle, names: Sequence[str], values: Array, lift_off: bool = False
+) -> Array:
+    """Many cars (C, CAR_ROWS): a vehicle with other numbers in each.
+
+    names : dotted paths of P numbers, e.g. `front.pivot.angle`
+    values : (C, P), SI
+
+    Each row is `car_row` of `vehicle.with_values`; it is not a number throughout where one of the
+    two refuses the car. Raises ParameterError for a path that leads to no number.
+    """
+    rows = np.empty((len(values), CAR_ROWS))
+    for first in range(0, len(values), AT_ONCE):
+        some = slice(first, first + AT_ONCE)
+        cars = vehicle.varied(dict(zip(names, values[some].T, strict=True)))
+        with np.errstate(all="ignore"):  # of impossible cars
+            loads = loads_at_rest(cars)
+            _write(rows[some], cars, loads, lift_off)
+            rows[some][~(possible(cars) & stands(loads))] = np.nan
+    return rows
+
+
+def _write(rows: Array, vehicle: Vehicle, loads: StaticLoads, lift_off: bool) -> None:
+    """Write the row (CAR_ROWS,) of a vehicle, or those of many (C, CAR_ROWS)."""
+    corners = (corner_record(vehicle, corner, loads, lift_off) for corner in CORNERS)
+    numbers = (*body_record(vehicle), *(number for corner in corners for number in corner))
+    for place, number in enumerate(numbers):
+        rows[..., place] = number

@@ -14,11 +14,12 @@ the spring, which stands over the wheel centre:
 The moment of the pivot's own vertical force vanishes, whatever the sign of `d`.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
-from .errors import VehicleError
 from .frames import AXLES, CORNERS, GRAVITY, AxleName, Corner, axle_of
-from .vehicle import Vehicle
+from .vehicle import Condition, Vehicle, all_hold, require
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +41,20 @@ def static_loads(vehicle: Vehicle) -> StaticLoads:
 
     Raises VehicleError where an axle would lift off at rest or its springs would have to pull.
     """
+    loads = loads_at_rest(vehicle)
+    require(_conditions(loads))
+    return loads
+
+
+def stands(loads: StaticLoads) -> Any:
+    """Whether a car can stand on such loads, which `static_loads` refuses otherwise; of many cars
+    (C,).
+    """
+    return all_hold(holds for holds, _ in _conditions(loads))
+
+
+def loads_at_rest(vehicle: Vehicle) -> StaticLoads:
+    """What `static_loads` checks, of one car or of many."""
     front, rear, wheelbase = vehicle.front, vehicle.rear, vehicle.wheelbase
     front_share = (
         vehicle.chassis.mass * rear.cg_distance
@@ -54,23 +69,32 @@ def static_loads(vehicle: Vehicle) -> StaticLoads:
     preload: dict[AxleName, float] = {
         name: 0.5 * axle_load[name] - _carried_by_wheel(vehicle, name) for name in AXLES
     }
-    for name in AXLES:
-        if axle_load[name] <= 0.0:
-            raise VehicleError(
-                f"At rest the {name} wheels would have to pull on the ground with"
-                f" {-axle_load[name]:.4g} N; correct the axles' cg_distance or wheel.cg_offset."
-            )
-        if preload[name] <= 0.0:
-            raise VehicleError(
-                f"At rest each {name} spring would have to pull with {-preload[name]:.4g} N, for"
-                f" the wheel's own weight acts behind its arm; correct {name}.wheel.cg_offset,"
-                f" {name}.wheel.mass or {name}.pivot.distance."
-            )
     return StaticLoads(
         axle_load=axle_load,
         tyre_load={corner: 0.5 * axle_load[axle_of(corner)] for corner in CORNERS},
         preload={corner: preload[axle_of(corner)] for corner in CORNERS},
     )
+
+
+def _conditions(loads: StaticLoads) -> Iterator[Condition]:
+    left: dict[AxleName, Corner] = {"front": "fl", "rear": "rl"}
+    for name in AXLES:
+        load, preload = loads.axle_load[name], loads.preload[left[name]]
+        yield (
+            load > 0.0,
+            lambda: (
+                f"At rest the {name} wheels would have to pull on the ground with {-load:.4g} N;"
+                " correct the axles' cg_distance or wheel.cg_offset."
+            ),
+        )
+        yield (
+            preload > 0.0,
+            lambda: (
+                f"At rest each {name} spring would have to pull with {-preload:.4g} N, for the"
+                f" wheel's own weight acts behind its arm; correct {name}.wheel.cg_offset,"
+                f" {name}.wheel.mass or {name}.pivot.distance."
+            ),
+        )
 
 
 def _carried_by_wheel(vehicle: Vehicle, name: AxleName) -> float:

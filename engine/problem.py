@@ -12,6 +12,7 @@ from typing import TypeVar, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from .car_rows import car_rows
 from .channels import OUTPUT_CHANNELS, Run
 from .errors import ProblemError, VehicleError
 from .filters import low_pass, too_coarse
@@ -157,6 +158,13 @@ class Problem:
         """The car at the optimiser's variables x."""
         names = (one.name for one in self.free)
         return self.vehicle.with_values(dict(zip(names, self.values(x).tolist(), strict=True)))
+
+    def cars_at(self, trials: Sequence[Array]) -> Array:
+        """Rows (C, CAR_ROWS) of the cars at many of the optimiser's variables; one is not a number
+        throughout where bounds admit a geometry that no car can have.
+        """
+        names = [one.name for one in self.free]
+        return car_rows(self.vehicle, names, np.array([self.values(x) for x in trials]))
 
 
 def _by_name(given: Mapping[str, Given], what: str) -> dict[str, Given]:

@@ -28,19 +28,17 @@ from numpy.typing import NDArray
 
 from .car_rows import car_row
 from .channels import OUTPUT_CHANNELS
-from .equilibrium import static_loads
-from .errors import Cancelled, VehicleError
+from .errors import Cancelled
 from .filters import smoothed
 from .kernels.lanes import BATCH
 from .problem import Problem
 from .rims import RimsInputs
 from .simulation import Traction
 from .stability import check_rims_step
-from .vehicle import Vehicle
 
 Array = NDArray[np.float64]
-Simulate = Callable[[list[Vehicle], RimsInputs, Traction], Array]
-"""(cars, inputs, traction) -> (cars, samples, 3); a failed car is not a number throughout."""
+Simulate = Callable[[Array, RimsInputs, Traction], Array]
+"""(cars (C, CAR_ROWS), inputs, traction) -> (C, samples, 3); a failed car is not a number."""
 
 DIFFERENCE = 1e-4
 """Step h of the differences of x."""
@@ -169,35 +167,27 @@ class Residuals:
 
     def _batch(self, trials: Sequence[Array]) -> Array:
         """Residuals of many cars, (cars, samples of all blocks); a failed car is not a number."""
-        cars = {k: car for k, x in enumerate(trials) if (car := self._possible_car(x)) is not None}
+        cars = self.problem.cars_at(trials)
+        possible = np.isfinite(cars).all(axis=1)
         blocks = self.blocks()
         rows = np.full((len(trials), blocks[-1].place.stop), np.nan)
-        if not cars:
+        if not possible.any():
             return rows
-        histories = self._histories(list(cars.values()))
+        histories = self._histories(cars[possible])
         for block in blocks:
             model = histories[block.run][:, :, OUTPUT_CHANNELS.index(block.channel)]
-            rows[list(cars), block.place] = (model - block.measured) / block.noise
+            rows[possible, block.place] = (model - block.measured) / block.noise
         rows[~np.isfinite(rows).all(axis=1)] = np.nan
         return rows
 
-    def _possible_car(self, x: Array) -> Vehicle | None:
-        """The car at x, or None where bounds admit a geometry that no car can have."""
-        try:
-            vehicle = self.problem.vehicle_at(x)
-            static_loads(vehicle)
-        except VehicleError:
-            return None
-        return vehicle
-
-    def _histories(self, vehicles: list[Vehicle]) -> dict[str, Array]:
+    def _histories(self, cars: Array) -> dict[str, Array]:
         """By run (cars, samples, 3), filtered; the runs side by side, looking at `cancelled`."""
         pool = ThreadPoolExecutor(RUNS_AT_ONCE)
         try:
             parts = [
                 [
                     pool.submit(self._simulate, some, seen.inputs, self.problem.traction)
-                    for some in _parts(vehicles, len(seen.inputs.node_time))
+                    for some in _parts(cars, len(seen.inputs.node_time))
                 ]
                 for seen in self.problem.runs
             ]
@@ -205,7 +195,7 @@ class Residuals:
             while pending:
                 self._stop_if_cancelled()
                 pending = wait(pending, LOOK_EVERY).not_done
-            self.simulations += len(vehicles) * len(parts)
+            self.simulations += len(cars) * len(parts)
             done = ([future.result() for future in run] for run in parts)
             return {
                 seen.name: self._filtered(seen.inputs.time, np.concatenate(of_run))
@@ -230,7 +220,7 @@ class Residuals:
             )
 
 
-def _parts(vehicles: list[Vehicle], nodes: int) -> list[list[Vehicle]]:
+def _parts(cars: Array, nodes: int) -> list[Array]:
     """The cars in batches that keep memory flat on long runs."""
     at_once = LANES * max(1, CAR_STEPS_AT_ONCE // (LANES * nodes))
-    return [vehicles[k : k + at_once] for k in range(0, len(vehicles), at_once)]
+    return [cars[k : k + at_once] for k in range(0, len(cars), at_once)]

@@ -5,7 +5,7 @@ Three modes (docs/model.md): `simulate_road` drives the car over a road by torqu
 car on four moving posts. `rims_batch` is the identification's view of many cars at once.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import baseline
-from .car_rows import car_row, car_rows
+from .car_rows import car_row
 from .channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
 from .demand import Demand, PiecewiseLinear, PostMotion
 from .errors import SimulationDiverged, SimulationError
@@ -172,12 +172,11 @@ def simulate_rims(
     )
 
 
-def rims_batch(vehicles: Sequence[Vehicle], inputs: RimsInputs, traction: Traction) -> Array:
-    """z, pitch and roll of many cars on the same rims, (cars, samples, 3); NaN where one failed or
-    throughout where the step is too long for one.
+def rims_batch(cars: Array, inputs: RimsInputs, traction: Traction) -> Array:
+    """z, pitch and roll of many cars (C, CAR_ROWS) on the same rims, (C, samples, 3); NaN where one
+    failed or throughout where the step is too long for one.
     """
     _require_choice("traction", traction, Traction)
-    cars = car_rows(vehicles)
     stable = stable_on_rims(cars, inputs.step)
     found = np.full((len(cars), len(inputs.time), 3), np.nan)
     if stable.any():

@@ -4,15 +4,21 @@ The field names are the keys of the vehicle's JSON, so a dotted path such as
 `front.pivot.angle` names the same number in a file, in an error and in the table of parameters.
 Everything is in SI and radians. The range beside each number says what is accepted: wide enough
 for a kart and a lorry, narrow enough to catch a value in the wrong unit.
+
+A number may be an array (C,), which makes a vehicle C cars that share the rest (`Vehicle.varied`);
+what is derived from a vehicle here and in `equilibrium` and `car_rows` holds for one and for many.
 """
 
-import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass, replace
+import operator
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, is_dataclass, replace
 from difflib import get_close_matches
-from functools import cache
+from functools import cache, reduce
 from types import NoneType
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
 
 from .errors import ParameterError, VehicleError
 from .frames import AXLES, CORNERS, AxleName, Corner, axle_of
@@ -29,7 +35,7 @@ class Range:
 
     def holds(self, value: float) -> bool:
         """Whether a value is accepted; NaN never is."""
-        return self.lower <= value <= self.upper and abs(value) >= self.apart
+        return (self.lower <= value) & (value <= self.upper) & (abs(value) >= self.apart)
 
     def __str__(self) -> str:
         """Say the range as a person reads it."""
@@ -55,6 +61,9 @@ TorsionalStiffness = Annotated[float, Range("N m/rad", 0.0, 1e7)]
 TorsionalDamping = Annotated[float, Range("N m s/rad", 0.0, 1e6)]
 Share = Annotated[float, Range("1", 0.0, 1.0)]
 Reaction = Literal["chassis", "arm"]
+
+Condition = tuple[Any, Callable[[], str]]
+"""What must hold of a car, and the sentence to say where it does not; of many cars, (C,)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,15 +218,23 @@ class Vehicle:
 
     def with_values(self, values: Mapping[str, float]) -> "Vehicle":
         """This car with the numbers at some dotted paths replaced, checked like a file."""
-        vehicle = self
-        for path, value in values.items():
-            _require_number(self, path)
-            vehicle = _replaced(vehicle, path.split("."), float(value))
+        vehicle = self._with({path: float(value) for path, value in values.items()})
         check(vehicle)
         return vehicle
 
+    def varied(self, values: Mapping[str, NDArray[np.float64]]) -> "Vehicle":
+        """Many cars: this one with arrays (C,) at some dotted paths; `possible` checks them."""
+        return self._with(values)
 
-def _replaced(record: Any, names: list[str], value: float) -> Any:
+    def _with(self, values: Mapping[str, Any]) -> "Vehicle":
+        vehicle = self
+        for path, value in values.items():
+            _require_number(self, path)
+            vehicle = _replaced(vehicle, path.split("."), value)
+        return vehicle
+
+
+def _replaced(record: Any, names: list[str], value: Any) -> Any:
     name, *rest = names
     return replace(
         record, **{name: _replaced(getattr(record, name), rest, value) if rest else value}
@@ -265,15 +282,14 @@ def _require_number(vehicle: Vehicle, path: str) -> None:
 
 def _ranged(record: Any, prefix: str = "") -> Iterator[tuple[str, float, Range]]:
     """Every number of a record with its dotted path and accepted range."""
-    kinds = field_types(type(record))
-    for field in fields(record):
-        path, value = prefix + field.name, getattr(record, field.name)
-        accepted = kinds[field.name][1]
-        if is_dataclass(value):
-            yield from _ranged(value, f"{path}.")
-        elif accepted is not None and isinstance(value, tuple):
+    for name, (_, accepted) in field_types(type(record)).items():
+        path, value = prefix + name, getattr(record, name)
+        if accepted is None:
+            if is_dataclass(value):
+                yield from _ranged(value, f"{path}.")
+        elif isinstance(value, tuple):
             yield from ((f"{path}[{i}]", element, accepted) for i, element in enumerate(value))
-        elif accepted is not None:
+        else:
             yield path, value, accepted
 
 
@@ -283,58 +299,84 @@ def check(vehicle: Vehicle, source: str = "vehicle") -> None:
     source : what the car was read from, named at the head of every message
     Raises VehicleError naming the dotted path, the accepted range and what to do.
     """
+    require(_conditions(vehicle), f"{source}: ")
+
+
+def possible(vehicle: Vehicle) -> Any:
+    """Whether `check` accepts a car; of many cars (C,)."""
+    return all_hold(holds for holds, _ in _conditions(vehicle))
+
+
+def require(conditions: Iterable[Condition], head: str = "") -> None:
+    """Raise VehicleError with the sentence of the first condition that one car does not meet."""
+    for holds, sentence in conditions:
+        if not holds:
+            raise VehicleError(f"{head}{sentence()}")
+
+
+def all_hold(conditions: Iterable[Any]) -> Any:
+    """Whether all of some conditions hold, for one car or for each of many."""
+    return reduce(operator.and_, conditions)
+
+
+def _conditions(vehicle: Vehicle) -> Iterator[Condition]:
+    """What `check` asks for, in its order."""
     for path, value, accepted in _ranged(vehicle):
-        if not accepted.holds(value):
-            unit = "" if accepted.unit == "1" else f" {accepted.unit}"
-            raise VehicleError(
-                f"{source}: {path} is {value:g}{unit}, but must lie {accepted}; correct it."
-            )
+        unit = "" if accepted.unit == "1" else f" {accepted.unit}"
+        yield (
+            accepted.holds(value),
+            lambda: f"{path} is {value:g}{unit}, but must lie {accepted}; correct it.",
+        )
     inertia = vehicle.chassis.inertia
-    _check_inertia(
-        f"{source}: chassis.inertia", *_principal_moments(inertia), crossed=inertia.xz != 0.0
-    )
+    crossed = inertia.xz != 0.0
+    yield _real_inertia("chassis.inertia", *_principal_moments(inertia), crossed=crossed)
     for name in AXLES:
         axle = vehicle.axle(name)
         moments = axle.wheel.inertia
-        _check_inertia(f"{source}: {name}.wheel.inertia", moments.xx, moments.yy, moments.zz)
-        _check_arm(f"{source}: {name}.pivot", axle)
-    if not vehicle.driven_corners:
-        raise VehicleError(
-            f"{source}: front.driven and rear.driven are both false; set one of them to true."
-        )
+        yield _real_inertia(f"{name}.wheel.inertia", moments.xx, moments.yy, moments.zz)
+        yield _carrying_arm(f"{name}.pivot", axle)
+    yield (
+        bool(vehicle.driven_corners),
+        lambda: "front.driven and rear.driven are both false; set one of them to true.",
+    )
 
 
-def _check_arm(place: str, axle: Axle) -> None:
-    """Refuse an arm so near the vertical that it cannot carry its wheel up and down."""
+def _carrying_arm(place: str, axle: Axle) -> Condition:
+    """No arm stands so near the vertical that it cannot carry its wheel up and down."""
     pivot = axle.pivot
-    height = pivot.distance * math.tan(pivot.angle)
+    height = pivot.distance * np.tan(pivot.angle)
     along, up = abs(pivot.distance), abs(height - axle.wheel.radius)
-    if along < STEEPEST_ARM * math.hypot(along, up):
-        raise VehicleError(
+    return (
+        along >= STEEPEST_ARM * np.hypot(along, up),
+        lambda: (
             f"{place} lies {along:.3g} m from the wheel along the car at a height of {height:.3g}"
-            f" m, so that the arm stands {math.degrees(math.atan2(along, up)):.2g} deg from the"
+            f" m, so that the arm stands {np.degrees(np.arctan2(along, up)):.2g} deg from the"
             " vertical and cannot carry the wheel up and down; lengthen pivot.distance or bring"
             " pivot.angle nearer to zero."
-        )
+        ),
+    )
 
 
-def _principal_moments(inertia: Inertia) -> tuple[float, float, float]:
+def _principal_moments(inertia: Inertia) -> tuple[Any, Any, Any]:
     """Eigenvalues of the tensor, which is symmetric about the xz plane."""
     mean = 0.5 * (inertia.xx + inertia.zz)
-    spread = math.hypot(0.5 * (inertia.xx - inertia.zz), inertia.xz)
+    spread = np.hypot(0.5 * (inertia.xx - inertia.zz), inertia.xz)
     return mean - spread, inertia.yy, mean + spread
 
 
-def _check_inertia(place: str, *moments: float, crossed: bool = False) -> None:
+def _real_inertia(place: str, *moments: Any, crossed: Any = False) -> Condition:
     """No principal moment of a real body is negative or exceeds the sum of the other two."""
-    total, largest = sum(moments), max(moments)
+    total = sum(moments)
     rounding = 1e-9 * total
-    if min(moments) >= -rounding and 2.0 * largest <= total + rounding:
-        return
-    what = "the principal moments (xz included)" if crossed else "the moments"
-    listed = ", ".join(f"{moment:.6g}" for moment in moments)
-    raise VehicleError(
-        f"{place} cannot belong to a real body: {what} {listed} kg m^2 must not be negative and"
-        " none may exceed the sum of the other two; correct xx, yy or zz"
-        + (" or xz." if crossed else ".")
-    )
+
+    def sentence() -> str:
+        what = "the principal moments (xz included)" if crossed else "the moments"
+        listed = ", ".join(f"{moment:.6g}" for moment in moments)
+        return (
+            f"{place} cannot belong to a real body: {what} {listed} kg m^2 must not be negative and"
+            " none may exceed the sum of the other two; correct xx, yy or zz"
+            + (" or xz." if crossed else ".")
+        )
+
+    within = ((one >= -rounding) & (2.0 * one <= total + rounding) for one in moments)
+    return all_hold(within), sentence

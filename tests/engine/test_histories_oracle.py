@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.engine.car_rows import car_rows
+from ridetune.engine.car_rows import car_row
 from ridetune.engine.channels import Run
 from ridetune.engine.demand import Demand, PiecewiseLinear, PostMotion
 from ridetune.engine.integration import free_states
@@ -53,7 +53,7 @@ def one_bump(begin=3.0, length=2.0, height=0.03, spacing=0.01, end=20.0):
 def states_of(vehicle, demand, step, sample_step):
     """Sample times (S,) and all coordinates and rates (S, 16)."""
     inputs = prepare_free(demand, step, sample_step)
-    states = free_states(car_rows([vehicle]), inputs)
+    states = free_states(car_row(vehicle)[np.newaxis], inputs)
     assert states.failed[0] == -1
     return inputs.time, states.values[0]
 
@@ -296,10 +296,11 @@ def test_a_drive_fed_back_as_rims_gives_its_own_motion():
 def test_cars_in_a_batch_move_as_alone():
     """Oracle: the same kernel, one car at a time; lanes may round differently, no more."""
     rng = np.random.default_rng(11)
-    cars = [random_vehicle(rng, braked=True) for _ in range(11)]
+    vehicles = [random_vehicle(rng, braked=True) for _ in range(11)]
     run = recording(np.linspace(0.0, 1.2, 241))
-    inputs = prepare(run, cars[0], UNFILTERED)
+    inputs = prepare(run, vehicles[0], UNFILTERED)
+    cars = np.stack([car_row(vehicle) for vehicle in vehicles])
     together = rims_batch(cars, inputs, "exact")
     for car, motion in zip(cars, together, strict=True):
-        alone = rims_batch([car], inputs, "exact")[0]
+        alone = rims_batch(car[np.newaxis], inputs, "exact")[0]
         assert_allclose(motion, alone, rtol=0, atol=1e-12)

@@ -48,7 +48,7 @@ def test_estimates_and_errors_are_those_of_linear_least_squares():
     basis = columns[:, :-1] / noise[:, np.newaxis]
     measured = np.concatenate(list(problem.runs[0].measured.values()))
     solved, *_ = np.linalg.lstsq(basis, (measured - columns[:, -1]) / noise, rcond=None)
-    assert_allclose(stand_in.weights(found.vehicle)[:-1], solved, rtol=0, atol=1e-6)
+    assert_allclose(stand_in.weights_of(found.vehicle)[:-1], solved, rtol=0, atol=1e-6)
     errors = np.sqrt(np.diag(np.linalg.inv(basis.T @ basis)))
     for one, error in zip(found.parameters, errors, strict=True):
         slope = 0.1 if one.name.endswith("angle") else one.value
@@ -103,9 +103,9 @@ def test_cancel_stops_the_fit():
 def test_a_parameter_without_effect_is_undetermined_and_named():
     """Oracle: the first parameter never enters the model; the others are as if it were fixed."""
 
-    def simulate(vehicles, inputs, traction):
-        same = [vehicle.with_values({PARAMETER_NAMES[0]: 24000.0}) for vehicle in vehicles]
-        return stand_in.simulate(same, inputs, traction)
+    def simulate(cars, inputs, traction):
+        same = {PARAMETER_NAMES[0]: np.full(len(cars), 24000.0)}
+        return stand_in.histories(stand_in.values_of(cars) | same, inputs)
 
     found = fit([stand_in.recording(CAR)], simulate)
     first, *others = found.parameters
@@ -120,14 +120,13 @@ def test_two_parameters_with_one_effect_are_named_together():
     """Oracle: stiffness and damping act through their product alone."""
     spring, damper = PARAMETER_NAMES[:2]
 
-    def simulate(vehicles, inputs, traction):
-        merged = [
-            vehicle.with_values(
-                {spring: vehicle.value(spring) * vehicle.value(damper) / 1700.0, damper: 1700.0}
-            )
-            for vehicle in vehicles
-        ]
-        return stand_in.simulate(merged, inputs, traction)
+    def simulate(cars, inputs, traction):
+        values = stand_in.values_of(cars)
+        merged = {
+            spring: values[spring] * values[damper] / 1700.0,
+            damper: np.full(len(cars), 1700.0),
+        }
+        return stand_in.histories(values | merged, inputs)
 
     bounds = {spring: (240.0, 2.4e6), damper: (17.0, 1.7e5)}
     found = fit([stand_in.recording(CAR)], simulate, bounds=bounds)
@@ -165,11 +164,9 @@ def test_trials_that_fail_are_stepped_around():
     """Oracle: the truth, on the edge of a region of cars that fail."""
     name = PARAMETER_NAMES[0]
 
-    def simulate(vehicles, inputs, traction):
-        histories = stand_in.simulate(vehicles, inputs, traction)
-        for car, vehicle in enumerate(vehicles):
-            if vehicle.value(name) < 0.99 * CAR.value(name):
-                histories[car] = np.nan
+    def simulate(cars, inputs, traction):
+        histories = stand_in.simulate(cars, inputs, traction)
+        histories[stand_in.values_of(cars)[name] < 0.99 * CAR.value(name)] = np.nan
         return histories
 
     far = {**ELSEWHERE, name: 7.0 * CAR.value(name)}
@@ -179,8 +176,8 @@ def test_trials_that_fail_are_stepped_around():
 
 
 def test_a_start_from_which_every_car_fails_is_refused_in_words():
-    def simulate(vehicles, inputs, traction):
-        return np.full((len(vehicles), len(inputs.time), 3), np.nan)
+    def simulate(cars, inputs, traction):
+        return np.full((len(cars), len(inputs.time), 3), np.nan)
 
     with pytest.raises(ProblemError, match=r"fails at the start values.*wheel\..*of run lap"):
         fit([stand_in.recording(CAR)], simulate)
@@ -190,11 +187,9 @@ def test_a_start_that_fails_beside_cars_that_do_not_is_left_with_a_word():
     """Oracle: the truth, which the fit reaches from one of the cars scattered around the start."""
     name = PARAMETER_NAMES[0]
 
-    def simulate(vehicles, inputs, traction):
-        histories = stand_in.simulate(vehicles, inputs, traction)
-        for car, vehicle in enumerate(vehicles):
-            if vehicle.value(name) > 1.2 * CAR.value(name):
-                histories[car] = np.nan
+    def simulate(cars, inputs, traction):
+        histories = stand_in.simulate(cars, inputs, traction)
+        histories[stand_in.values_of(cars)[name] > 1.2 * CAR.value(name)] = np.nan
         return histories
 
     found = fit([stand_in.recording(CAR, noise=0.0)], simulate)
@@ -213,11 +208,10 @@ def test_a_fit_out_of_evaluations_says_so():
 def test_a_fit_with_no_way_on_says_so():
     """Every car fails but those next to the start."""
 
-    def simulate(vehicles, inputs, traction):
-        histories = stand_in.simulate(vehicles, inputs, traction)
-        for car, vehicle in enumerate(vehicles):
-            if abs(vehicle.value(PARAMETER_NAMES[0]) / 31200.0 - 1.0) > 1e-3:
-                histories[car] = np.nan
+    def simulate(cars, inputs, traction):
+        histories = stand_in.simulate(cars, inputs, traction)
+        first = stand_in.values_of(cars)[PARAMETER_NAMES[0]]
+        histories[abs(first / 31200.0 - 1.0) > 1e-3] = np.nan
         return histories
 
     found = fit([stand_in.recording(CAR)], simulate)
@@ -255,9 +249,9 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
 def test_a_fit_file_is_strict_json_and_a_vehicle(tmp_path):
     """Oracle: the vehicle read back; JSON without NaN or Infinity; null for what is unknown."""
 
-    def simulate(vehicles, inputs, traction):
-        same = [vehicle.with_values({PARAMETER_NAMES[0]: 24000.0}) for vehicle in vehicles]
-        return stand_in.simulate(same, inputs, traction)
+    def simulate(cars, inputs, traction):
+        same = {PARAMETER_NAMES[0]: np.full(len(cars), 24000.0)}
+        return stand_in.histories(stand_in.values_of(cars) | same, inputs)
 
     found = fit([stand_in.recording(CAR)], simulate)
     write_fit(found, tmp_path / "fit.json")

@@ -40,7 +40,7 @@ def test_residuals_are_model_minus_measured_over_noise():
     asked = problem([first, second], noise={"chassis.roll": 1e-3})
     residuals = Residuals(asked, stand_in.simulate)
     r = residuals.vector(start_of(asked))
-    model = stand_in.basis(first.time) @ stand_in.weights(asked.vehicle)
+    model = stand_in.basis(first.time) @ stand_in.weights_of(asked.vehicle)
     for block in residuals.blocks():
         run = {"a": first, "b": second}[block.run]
         noise = 1e-3 if block.channel == "chassis.roll" else DEFAULT_NOISE[block.channel]
@@ -70,27 +70,25 @@ def test_jacobian_at_a_bound_looks_only_inwards(side):
     asked = problem([run])
     seen = []
 
-    def simulate(vehicles, inputs, traction):
-        seen.extend(vehicles)
-        return stand_in.simulate(vehicles, inputs, traction)
+    def simulate(cars, inputs, traction):
+        seen.append(stand_in.values_of(cars))
+        return stand_in.simulate(cars, inputs, traction)
 
     residuals = Residuals(asked, simulate)
     found = residuals.jacobian(getattr(residuals, side))
     assert_allclose(found, exact_jacobian(asked, run), rtol=0, atol=1e-7)
     for one in asked.free:
-        values = [vehicle.value(one.name) for vehicle in seen]
-        assert min(values) >= one.lower
-        assert max(values) <= one.upper
+        values, rounding = np.concatenate([cars[one.name] for cars in seen]), 1e-12
+        assert min(values) >= one.lower - rounding
+        assert max(values) <= one.upper + rounding
 
 
 def failing(condition):
-    """The stand-in, failing for cars that meet the condition."""
+    """The stand-in, failing for cars that meet a condition on their parameters by name."""
 
-    def simulate(vehicles, inputs, traction):
-        histories = stand_in.simulate(vehicles, inputs, traction)
-        for car, vehicle in enumerate(vehicles):
-            if condition(vehicle):
-                histories[car] = np.nan
+    def simulate(cars, inputs, traction):
+        histories = stand_in.simulate(cars, inputs, traction)
+        histories[condition(stand_in.values_of(cars))] = np.nan
         return histories
 
     return simulate
@@ -98,7 +96,7 @@ def failing(condition):
 
 def test_a_failed_car_has_large_finite_residuals():
     asked = problem([stand_in.recording(CAR)])
-    residuals = Residuals(asked, failing(lambda vehicle: True))
+    residuals = Residuals(asked, failing(lambda values: slice(None)))
     x = start_of(asked)
     assert np.all(residuals.vector(x) == FAILED_TRIAL)
     assert np.all(np.isinf(residuals.squares([x])))
@@ -110,7 +108,7 @@ def test_a_neighbour_that_fails_leaves_a_one_sided_difference():
     run = stand_in.recording(CAR)
     asked = problem([run])
     name = PARAMETER_NAMES[0]
-    stiffer = failing(lambda vehicle: vehicle.value(name) > 1.00001 * ELSEWHERE[name])
+    stiffer = failing(lambda values: values[name] > 1.00001 * ELSEWHERE[name])
     found = Residuals(asked, stiffer).jacobian(start_of(asked))
     assert_allclose(found, exact_jacobian(asked, run), rtol=0, atol=1e-7)
 
@@ -118,7 +116,7 @@ def test_a_neighbour_that_fails_leaves_a_one_sided_difference():
 def test_a_parameter_whose_neighbours_all_fail_has_no_derivative():
     asked = problem([stand_in.recording(CAR)])
     name = PARAMETER_NAMES[0]
-    both = failing(lambda vehicle: abs(vehicle.value(name) / ELSEWHERE[name] - 1.0) > 1e-5)
+    both = failing(lambda values: abs(values[name] / ELSEWHERE[name] - 1.0) > 1e-5)
     found = Residuals(asked, both).jacobian(start_of(asked))
     assert np.all(found[:, 0] == 0.0)
     assert np.all(np.any(found[:, 1:] != 0.0, axis=0))
@@ -140,10 +138,10 @@ def test_cancel_is_seen_while_a_simulation_is_under_way():
     asked = problem([stand_in.recording(CAR)])
     under_way, raised = threading.Event(), threading.Event()
 
-    def simulate(vehicles, inputs, traction):
+    def simulate(cars, inputs, traction):
         under_way.set()
         raised.wait(60.0)
-        return stand_in.simulate(vehicles, inputs, traction)
+        return stand_in.simulate(cars, inputs, traction)
 
     residuals = Residuals(asked, simulate, cancelled=under_way.is_set)
     try:
@@ -169,9 +167,9 @@ def test_long_runs_are_simulated_in_batches_of_whole_lanes():
     asked = problem([stand_in.recording(CAR, samples=30_001)])
     sizes = []
 
-    def simulate(vehicles, inputs, traction):
-        sizes.append(len(vehicles))
-        return stand_in.simulate(vehicles, inputs, traction)
+    def simulate(cars, inputs, traction):
+        sizes.append(len(cars))
+        return stand_in.simulate(cars, inputs, traction)
 
     residuals = Residuals(asked, simulate)
     residuals.squares([start_of(asked)] * 20)

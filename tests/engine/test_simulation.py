@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.engine.car_rows import car_rows
+from ridetune.engine.car_rows import car_row, car_rows
 from ridetune.engine.channels import Run
 from ridetune.engine.curves import smooth_step
 from ridetune.engine.errors import RoadError, SimulationDiverged, SimulationError
@@ -44,15 +44,16 @@ def driven(car, short_drive):
     return simulate_road(car, short_drive).run
 
 
-def cars(car, count):
-    return [car.with_values({"front.suspension.stiffness": float(k)}) for k in STIFFNESSES[:count]]
+def rows(*cars):
+    return np.stack([car_row(car) for car in cars])
 
 
 @pytest.mark.parametrize("count", [2, 9, 65])
 def test_a_batch_gives_each_cars_single_result(car, short_drive, count):
     """Oracle: the same car alone. Lanes contract products differently: rounding only."""
     inputs = prepare_free(short_drive.demand(car), 0.002, 0.1)
-    rows = car_rows(cars(car, count))
+    stiffness = np.array(STIFFNESSES[:count], dtype=float)
+    rows = car_rows(car, ["front.suspension.stiffness"], stiffness[:, np.newaxis])
     batch = free_states(rows, inputs).values
     alone = np.concatenate([free_states(row[np.newaxis], inputs).values for row in rows])
     assert_allclose(batch, alone, rtol=0, atol=1e-11)
@@ -178,7 +179,7 @@ def test_wheels_on_a_recording_that_pass_a_mount_are_named(car):
     low = car.with_values({"rear.suspension.mount_height": 0.05})
     with pytest.raises(SimulationDiverged, match=r"in suspension\.r[lr]\.travel; .* mount"):
         simulate_rims(low, run)
-    assert np.all(np.isnan(rims_batch([low, car], prepare(run, car), "exact")[0, -1]))
+    assert np.all(np.isnan(rims_batch(rows(low, car), prepare(run, car), "exact")[0, -1]))
 
 
 def test_rims_out_of_reach_are_named(car, driven):
@@ -201,9 +202,9 @@ def test_a_car_without_equilibrium_fails_alone_in_its_batch(car, driven):
     run = Run("raised", driven.time, raised)
     short = car.with_values({"front.pivot.distance": 0.1})
     inputs = prepare(run, car)
-    batch = rims_batch([short, car], inputs, "exact")
+    batch = rims_batch(rows(short, car), inputs, "exact")
     assert np.all(np.isnan(batch[0]))
-    assert_allclose(batch[1], rims_batch([car], inputs, "exact")[0], rtol=0, atol=1e-11)
+    assert_allclose(batch[1], rims_batch(rows(car), inputs, "exact")[0], rtol=0, atol=1e-11)
     with pytest.raises(SimulationError, match="No static equilibrium"):
         simulate_rims(short, run)
 
@@ -231,7 +232,7 @@ def test_a_misspelt_choice_is_refused_with_the_choices(car, driven, short_drive)
     with pytest.raises(SimulationError, match='traction is "exakt"; it can be "exact" or "paper"'):
         simulate_rims(car, driven, traction="exakt")
     with pytest.raises(SimulationError, match='traction is "typo"; it can be "exact" or "paper"'):
-        rims_batch([car], prepare(driven, car), "typo")
+        rims_batch(rows(car), prepare(driven, car), "typo")
     for simulate, motion in (
         (simulate_road, short_drive),
         (simulate_posts, reference_manoeuvres()["heave"]),

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.engine.car_rows import car_row, car_rows
+from ridetune.engine.car_rows import car_row
 from ridetune.engine.channels import Run
 from ridetune.engine.demand import Demand, PiecewiseLinear
 from ridetune.engine.errors import SimulationError
@@ -127,10 +127,10 @@ def test_many_cars_at_once_are_judged_like_each_alone():
     """Oracle: the refusal of one car, found by walking along each eigenvalue's ray."""
     rng = np.random.default_rng(7)
     dampings = 10.0 ** rng.uniform(3.0, 5.5, 40)
-    cars = [random_vehicle(rng).with_values({next(iter(STIFF)): c}) for c in dampings]
+    cars = rows(*(random_vehicle(rng).with_values({next(iter(STIFF)): c}) for c in dampings))
     for step in (0.002, 0.005, 0.02):
         refused = []
-        for car in car_rows(cars):
+        for car in cars:
             try:
                 check_rims_step(car, step)
             except SimulationError as error:
@@ -140,8 +140,12 @@ def test_many_cars_at_once_are_judged_like_each_alone():
                 refused.append(True)
             else:
                 refused.append(False)
-        assert list(~stable_on_rims(car_rows(cars), step)) == refused
+        assert list(~stable_on_rims(cars, step)) == refused
         assert 0 < sum(refused) < len(refused)
+
+
+def rows(*cars):
+    return np.stack([car_row(car) for car in cars])
 
 
 def ride(car):
@@ -154,11 +158,11 @@ def test_an_unstable_car_of_a_batch_fails_and_spoils_no_other():
     not carry it off: the integrator alone would take it for a car."""
     car = paper_vehicle()
     inputs, stiff = prepare(ride(car), car), car.with_values({next(iter(STIFF)): 1.35e5})
-    assert rims_states(car_rows([stiff]), inputs, True).failed[0] < 0
-    found = rims_batch([stiff, car], inputs, "exact")
+    assert rims_states(rows(stiff), inputs, True).failed[0] < 0
+    found = rims_batch(rows(stiff, car), inputs, "exact")
     assert np.all(np.isnan(found[0]))
-    assert_allclose(found[1], rims_batch([car], inputs, "exact")[0], rtol=0, atol=1e-12)
-    assert np.all(np.isnan(rims_batch([stiff], inputs, "exact")))
+    assert_allclose(found[1], rims_batch(rows(car), inputs, "exact")[0], rtol=0, atol=1e-12)
+    assert np.all(np.isnan(rims_batch(rows(stiff), inputs, "exact")))
 
 
 def test_a_fit_is_refused_an_unstable_start_and_counts_an_unstable_trial_as_failed():
