@@ -17,6 +17,7 @@ from scipy.optimize import least_squares
 from scipy.stats.qmc import Halton
 
 from .channels import WHEEL_CHANNELS
+from .condensed import condensed_jacobian, condensed_residuals
 from .errors import ProblemError
 from .fit import CONVERGED, Fit, FittedRun, Outcome, ParameterEstimate, Progress, determined
 from .fit_findings import (
@@ -63,7 +64,13 @@ MUCH_BETTER = 0.5
 
 
 class _Search:
-    """Residuals as the optimiser calls them, keeping the best point and telling of progress."""
+    """Residuals as the optimiser calls them, condensed, keeping the best point and telling of
+    progress.
+
+    slopes : (samples, parameters) the last Jacobian asked for, which is that at the solution
+    """
+
+    slopes: Array
 
     def __init__(self, residuals: Residuals, progress: Callable[[Progress], None] | None):
         self.residuals = residuals
@@ -73,7 +80,7 @@ class _Search:
         self._progress = progress
 
     def vector(self, x: Array) -> Array:
-        """r(x); one evaluation."""
+        """r(x), condensed; one evaluation."""
         r = self.residuals.vector(x)
         cost = 0.5 * float(r @ r)
         self.evaluations += 1
@@ -83,7 +90,12 @@ class _Search:
         self.cost_history.append(min([cost, *self.cost_history[-1:]]))
         if self._progress is not None:
             self._progress(self._state())
-        return r
+        return condensed_residuals(r, len(x))
+
+    def jacobian(self, x: Array) -> Array:
+        """dr/dx, condensed."""
+        self.slopes = self.residuals.jacobian(x)
+        return condensed_jacobian(self.residuals.vector(x), self.slopes)
 
     def _state(self) -> Progress:
         x, r = self._best
@@ -132,7 +144,7 @@ def identify(
     solution = least_squares(
         search.vector,
         x_start,
-        cast(Any, residuals.jacobian),  # scipy's hints know no callable here
+        cast(Any, search.jacobian),  # scipy's hints know no callable here
         bounds=(residuals.lower, residuals.upper),
         method="trf",
         ftol=COST_TOLERANCE,
@@ -145,7 +157,7 @@ def identify(
     r = residuals.vector(solution.x)
     places = [block.place for block in residuals.blocks()]
     slopes = [one.slope(float(x)) for one, x in zip(problem.free, solution.x, strict=True)]
-    jacobian = solution.jac / np.array(slopes)
+    jacobian = search.slopes / np.array(slopes)
     scale = np.array([one.scale for one in problem.free])
     errors = uncertainty([(r[place], jacobian[place]) for place in places], scale)
     values = problem.values(solution.x)

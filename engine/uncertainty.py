@@ -33,6 +33,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student_t
 
+from .condensed import triangle
+
 Array = NDArray[np.float64]
 
 DIRECTION_TOLERANCE = 1e-7
@@ -73,7 +75,7 @@ def uncertainty(blocks: Sequence[tuple[Array, Array]], scale: Array) -> Uncertai
     """
     n = len(scale)
     jacobian = np.concatenate([block_jacobian for _, block_jacobian in blocks]) * scale
-    _, singular, directions = np.linalg.svd(np.linalg.qr(jacobian, mode="r"))
+    _, singular, directions = np.linalg.svd(triangle(jacobian))
     least = max(DIRECTION_TOLERANCE * singular[0], LEAST_EFFECT)
     known = singular > least
     undetermined = np.any(np.abs(directions[~known]) > PART_OF_DIRECTION, axis=0)
