@@ -31,17 +31,17 @@ RAMP = 0.1
 
 
 def braking_of(
-    run: Run, a_x: Array, vehicle: Vehicle, rolling: float
+    run: Run, slow_a_x: Array, vehicle: Vehicle, rolling: float
 ) -> tuple[list[Interval], list[str]]:
     """Where the run brakes, marked or else found in a_x, and warnings.
 
-    a_x : (samples,) filtered, m/s2
+    slow_a_x : (samples,) of `slow_acceleration`, m/s2
     rolling : rolling resistance coefficient fr of the whole car
 
     Raises MeasurementError for marks that mean nothing in the run, VehicleError for marks on a
     vehicle without brakes. Braking that is found with such a vehicle is only told of.
     """
-    intervals = find_braking(run.time, a_x, rolling) if run.braking is None else _marked(run)
+    intervals = find_braking(run.time, slow_a_x, rolling) if run.braking is None else _marked(run)
     if vehicle.brakes is not None or not intervals:
         return intervals, []
     if run.braking is not None:
@@ -74,10 +74,14 @@ def _marked(run: Run) -> list[Interval]:
     return [(max(begin, first), min(end, last)) for begin, end in run.braking or ()]
 
 
-def find_braking(time: Array, a_x: Array, rolling: float) -> list[Interval]:
+def slow_acceleration(time: Array, a_x: Array) -> Array:
+    """a_x (samples,) low-passed at 1 Hz, where braking shows."""
+    return smoothed(time, a_x, CUTOFF)
+
+
+def find_braking(time: Array, slow_a_x: Array, rolling: float) -> list[Interval]:
     """Where a_x, low-passed at 1 Hz, stays below -(fr g + 0.5 m/s2) for at least 0.5 s."""
-    level = -(rolling * GRAVITY + MARGIN)
-    below = smoothed(time, a_x, CUTOFF) < level
+    below = slow_a_x < -(rolling * GRAVITY + MARGIN)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], below, [False]]).astype(int)))
     spans = [(time[first], time[last - 1]) for first, last in edges.reshape(-1, 2)]
     return [(float(begin), float(end)) for begin, end in spans if end - begin >= LASTS]

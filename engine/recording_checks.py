@@ -62,6 +62,9 @@ UNIT_SPREAD = 1.3
 """Factor around such a ratio that counts."""
 
 
+Array = NDArray[np.float64]
+
+
 class Finding(NamedTuple):
     """A sentence, and whether what drives the model is wrong by it."""
 
@@ -69,10 +72,10 @@ class Finding(NamedTuple):
     fault: bool
 
 
-def check_recording(run: Run, vehicle: Vehicle) -> list[Finding]:
+def check_recording(run: Run) -> list[Finding]:
     """Findings about one run that has the channels of the rims mode."""
     return [
-        *(Finding(sentence, False) for sentence in (*_gaps(run), *_rest_values(run, vehicle))),
+        *(Finding(sentence, False) for sentence in _gaps(run)),
         *(
             Finding(sentence, True)
             for name in INPUT_CHANNELS
@@ -80,7 +83,19 @@ def check_recording(run: Run, vehicle: Vehicle) -> list[Finding]:
         ),
         *_acceleration_against_speed(run),
         *(Finding(sentence, True) for sentence in _one_wheel_turned_over(run)),
-        *(Finding(sentence, True) for sentence in exchanged_wheels(run, vehicle.wheelbase)),
+    ]
+
+
+def check_on_car(run: Run, standing: bool, rises: Array | None, vehicle: Vehicle) -> list[Finding]:
+    """Findings about such a run once it is known which car follows it.
+
+    standing : of `stands`; rises : of `wheel_order.wheel_rises`
+    """
+    rest_values = _rest_values(run, vehicle) if standing else []
+    exchanged = [] if rises is None else exchanged_wheels(run, rises, vehicle.wheelbase)
+    return [
+        *(Finding(sentence, False) for sentence in rest_values),
+        *(Finding(sentence, True) for sentence in exchanged),
     ]
 
 
@@ -113,8 +128,6 @@ def _start(run: Run) -> NDArray[np.bool_]:
 
 def _rest_values(run: Run, vehicle: Vehicle) -> list[str]:
     """Channels of a standing car that do not read what its wheels put them at, and a_x not zero."""
-    if not stands(run):
-        return []
     start = _start(run)
     on_wheels = _plane(vehicle, [np.mean(run[name][start]) for name in WHEEL_CHANNELS])
     expected = dict(zip(OUTPUT_CHANNELS, on_wheels, strict=True)) | {"chassis.a_x": 0.0}

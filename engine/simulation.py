@@ -30,7 +30,8 @@ from .output_channels import (
     torque_channels,
     traction_torques,
 )
-from .rims import RimsInputs, filtered_outputs, prepare
+from .recorded_motion import RecordedMotion, recorded_motion
+from .rims import RimsInputs, filtered_outputs, for_car
 from .rims_settings import RimsSettings
 from .road import Road
 from .stability import check_free_step, check_rims_step, stable_on_rims
@@ -129,7 +130,7 @@ def simulate_posts(
 
 def simulate_rims(
     vehicle: Vehicle,
-    run: Run,
+    recording: Run | RecordedMotion,
     *,
     traction: Traction = "exact",
     settings: RimsSettings | None = None,
@@ -138,6 +139,8 @@ def simulate_rims(
 ) -> Simulation:
     """Let a car follow the wheel centres and a_x of a recording, at the recording's own times.
 
+    recording : a run, or the motion made of it once for many cars
+    settings : how a run's motion is made; a motion made before has its own
     traction : "exact" follows a_x exactly; "paper" is the paper's Eq. 3, biased, for comparison
     Raises MeasurementError for a run without the inputs, SimulationError for a step too long for
     the car, SimulationDiverged when a wheel centre cannot reach its height or the car leaves the
@@ -145,8 +148,9 @@ def simulate_rims(
     """
     _require_choice("traction", traction, Traction)
     _require_choice("model", model, Model)
-    settings = settings or RimsSettings()
-    inputs = prepare(run, vehicle, settings)
+    motion = _motion(recording, settings)
+    run, settings = motion.run, motion.settings
+    inputs = for_car(motion, vehicle)
     ignored: tuple[str, ...] = ()
     if model == "7dof":
         untold = RimsSettings()
@@ -247,6 +251,17 @@ def _free(
     return Simulation(mode, result, _load_shares(result), inputs.steps.size)
 
 
+def _motion(recording: Run | RecordedMotion, settings: RimsSettings | None) -> RecordedMotion:
+    if isinstance(recording, Run):
+        return recorded_motion(recording, settings or RimsSettings())
+    if settings is not None:
+        raise SimulationError(
+            f"The motion of run {recording.run.name} was made with settings of its own; leave them"
+            " out, or give the run."
+        )
+    return recording
+
+
 def _rims_run(vehicle: Vehicle, inputs: RimsInputs, traction: Traction, points: Points) -> Run:
     """Channels of the 8-DOF car on its rims, at the recording's times."""
     exact = traction == "exact"
@@ -262,14 +277,13 @@ def _rims_run(vehicle: Vehicle, inputs: RimsInputs, traction: Traction, points: 
             car, states.values[0, node - 1 : node], nodal[node : node + 1], exact
         )[0],
     )
-    outputs = rims_outputs(car, states.values[0], nodal, exact)
-    channels = common_channels(states.values[0], outputs, points)
-    channels |= traction_torques(vehicle, outputs, nodal[:, 14])
-    channels["chassis.v_x"] = nodal[:, 13]
-    if inputs.on_nodes:
-        channels = {name: values[inputs.sample_node] for name, values in channels.items()}
-    else:
-        motion = states.values[0]
+    seen = inputs.sample_node if inputs.on_nodes else slice(None)
+    motion, given = states.values[0, seen], nodal[seen]
+    outputs = rims_outputs(car, motion, given, exact)
+    channels = common_channels(motion, outputs, points)
+    channels |= traction_torques(vehicle, outputs, given[:, 14])
+    channels["chassis.v_x"] = given[:, 13]
+    if not inputs.on_nodes:
         smooth = inputs.at_samples(motion[:, 1:4], motion[:, 9:12])
         channels = {
             name: np.interp(inputs.time, inputs.node_time, values)

@@ -48,25 +48,43 @@ alike within it either. On a sine road every distance is alike somewhere."""
 AS_GIVEN: Order = (0, 1, 2, 3)
 
 
-def exchanged_wheels(run: Run, wheelbase: float) -> list[str]:
-    """A sentence where the wheels' columns are probably exchanged.
+def wheel_rises(run: Run) -> Array | None:
+    """Rise of each wheel over RISE, (4, cells), at equal distances along the road.
 
-    wheelbase : m
-    Nothing is said without chassis.v_x: a_x integrated makes a rig drive. What is driven backwards
-    is not looked at.
+    None without chassis.v_x: a_x integrated makes a rig drive. What is driven backwards is not
+    looked at.
     """
     if "chassis.v_x" not in run:
-        return []
-    rises = _rises(run, cumulative_trapezoid(run["chassis.v_x"], run.time, initial=0.0))
+        return None
+    distance = cumulative_trapezoid(run["chassis.v_x"], run.time, initial=0.0)
+    furthest = np.maximum.accumulate(distance)
+    forward = np.flatnonzero(np.diff(furthest, prepend=-np.inf) > 0.0)
+    travelled = furthest[forward]
+    edges = np.arange(travelled[0], travelled[-1], CELL)
+    areas = (
+        cumulative_trapezoid(run[name][forward], travelled, initial=0.0) for name in WHEEL_CHANNELS
+    )
+    heights = np.array([np.diff(np.interp(edges, travelled, area)) / CELL for area in areas])
+    cells = round(RISE / CELL)
+    return heights[:, cells:] - heights[:, :-cells]
+
+
+def exchanged_wheels(run: Run, rises: Array, wheelbase: float) -> list[str]:
+    """A sentence where the wheels' columns are probably exchanged.
+
+    rises : of `wheel_rises`
+    wheelbase : m
+    """
     behind = round(wheelbase / CELL)
     furthest = round(NEAR * wheelbase / CELL)
     if rises.shape[1] < behind + furthest + SHORTEST / CELL or np.any(np.ptp(rises, axis=1) == 0.0):
         return []
     likeness = _likeness(rises, behind, permutations(AS_GIVEN))
     best = max(likeness.values())
+    if best < ALIKE or likeness[AS_GIVEN] > FAR_LESS * best:
+        return []
     lags = range(behind - furthest, behind + furthest + 1)
-    given = max(_likeness(rises, lag, [AS_GIVEN])[AS_GIVEN] for lag in lags)
-    if best < ALIKE or given > FAR_LESS * best:
+    if max(_likeness(rises, lag, [AS_GIVEN])[AS_GIVEN] for lag in lags) > FAR_LESS * best:
         return []
     order = _likeliest(run, [one for one, value in likeness.items() if value > best - TIE])
     read = [
@@ -88,23 +106,6 @@ def _likeness(rises: Array, lag: int, orders: Iterable[Order]) -> dict[Order, fl
         order: 0.5 * float(follows[order[0], order[2]] + follows[order[1], order[3]])
         for order in orders
     }
-
-
-def _rises(run: Run, distance: Array) -> Array:
-    """Rise of each wheel over RISE, (4, cells), at equal distances along the road.
-
-    distance : (samples,) travelled, m
-    """
-    furthest = np.maximum.accumulate(distance)
-    forward = np.flatnonzero(np.diff(furthest, prepend=-np.inf) > 0.0)
-    travelled = furthest[forward]
-    edges = np.arange(travelled[0], travelled[-1], CELL)
-    areas = (
-        cumulative_trapezoid(run[name][forward], travelled, initial=0.0) for name in WHEEL_CHANNELS
-    )
-    heights = np.array([np.diff(np.interp(edges, travelled, area)) / CELL for area in areas])
-    cells = round(RISE / CELL)
-    return heights[:, cells:] - heights[:, :-cells]
 
 
 def _likeliest(run: Run, orders: list[Order]) -> Order:

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.engine.braking import braking_weight, find_braking
+from ridetune.engine.braking import braking_weight, find_braking, slow_acceleration
 from ridetune.engine.channels import INPUT_CHANNELS, Run
 from ridetune.engine.errors import MeasurementError, VehicleError
 from ridetune.engine.rims import prepare
@@ -29,7 +29,7 @@ def test_braking_is_found_where_the_car_decelerates_long_and_hard_enough():
     a_x[(time > 5.0) & (time < 9.0)] = -4.0
     a_x[(time > 12.0) & (time < 12.1)] = -4.0
     a_x[time > 15.0] = -0.4
-    [(begin, end)] = find_braking(time, a_x, rolling=0.01)
+    [(begin, end)] = find_braking(time, slow_acceleration(time, a_x), rolling=0.01)
     assert abs(begin - 5.0) < 0.5
     assert abs(end - 9.0) < 0.5
 

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 from ridetune.engine.channels import INPUT_CHANNELS, Run
-from ridetune.engine.recording_checks import check_recording
+from ridetune.engine.recording_checks import check_on_car, check_recording, stands
+from ridetune.engine.wheel_order import wheel_rises
 
 from ..factories import paper_vehicle
 
@@ -18,7 +19,8 @@ def run(time=TIME, **changed):
 
 
 def findings(recording):
-    return check_recording(recording, CAR)
+    on_car = check_on_car(recording, stands(recording), wheel_rises(recording), CAR)
+    return [*check_recording(recording), *on_car]
 
 
 def test_a_clean_recording_gives_no_finding():

@@ -1,10 +1,15 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from ridetune.engine.channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
-from ridetune.engine.errors import MeasurementError
-from ridetune.engine.rims import prepare
+from ridetune.engine.errors import MeasurementError, SimulationError
+from ridetune.engine.recorded_motion import recorded_motion
+from ridetune.engine.rims import for_car, prepare
 from ridetune.engine.rims_settings import RimsSettings
+from ridetune.engine.simulation import simulate_rims
+from ridetune.engine.vehicle import Brakes
 
 from ..factories import paper_vehicle
 
@@ -179,3 +184,23 @@ def test_a_pause_in_the_record_is_refused_with_its_place():
     time = np.concatenate([np.arange(0.0, 5.0, 0.01), 86400.0 + np.arange(0.0, 5.0, 0.01)])
     with pytest.raises(MeasurementError, match=r"pauses between 4\.99 and 86400\.00 s"):
         prepare(still_run(time), paper_vehicle())
+
+
+def test_a_motion_serves_one_car_after_another_as_the_run_serves_each():
+    """Oracle: the run prepared for each car by itself; the first car brakes, the other cannot."""
+    time = np.arange(0.0, 8.0, 0.005)
+    run = still_run(time, **{"chassis.a_x": np.where((time > 3) & (time < 6), -4.0, 0.0)})
+    motion = recorded_motion(run, RimsSettings())
+    for car in (replace(CAR, brakes=Brakes(front_share=0.65)), CAR):
+        found, expected = for_car(motion, car), prepare(run, car)
+        assert np.array_equal(found.stage_inputs, expected.stage_inputs)
+        assert (found.braking, found.warnings) == (expected.braking, expected.warnings)
+        followed, alone = simulate_rims(car, motion), simulate_rims(car, run)
+        assert np.array_equal(followed.run["chassis.pitch"], alone.run["chassis.pitch"])
+    assert motion.stage_inputs[:, :, 14].max() == 0.0
+
+
+def test_a_motion_takes_no_other_settings():
+    motion = recorded_motion(still_run(np.arange(0.0, 2.0, 0.005)), RimsSettings())
+    with pytest.raises(SimulationError, match="made with settings of its own; leave them out"):
+        simulate_rims(CAR, motion, settings=RimsSettings(step=0.001))

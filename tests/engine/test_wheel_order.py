@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from ridetune.engine.campaign import drive_campaign
 from ridetune.engine.channels import WHEEL_CHANNELS as WHEELS
-from ridetune.engine.wheel_order import exchanged_wheels
+from ridetune.engine.wheel_order import exchanged_wheels, wheel_rises
 from scipy.integrate import cumulative_trapezoid
 
 from ..factories import paper_vehicle
@@ -42,7 +42,8 @@ def exchanged(run, columns):
 
 
 def told(run):
-    return exchanged_wheels(run, CAR.wheelbase)
+    rises = wheel_rises(run)
+    return [] if rises is None else exchanged_wheels(run, rises, CAR.wheelbase)
 
 
 def names(sentence, columns):
