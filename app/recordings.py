@@ -1,42 +1,43 @@
 """Measurement files as runs: parsed once, kept in memory while they are in use, summed up.
 
-The original on disk stays the truth; a run here can always be read again from it.
+The original on disk stays the truth; a run here can always be read again from it, and the motion
+that it prescribes to every car made again.
 """
 
-import threading
-from collections import OrderedDict
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..engine.channels import Run, channel
 from ..engine.errors import MeasurementError
+from ..engine.rims_settings import RimsSettings
 from ..engine.run_notes import doubtful_noise
+from .remembered import Remembered
 from .store import Measurement, Store
 
+if TYPE_CHECKING:
+    from ..engine.recorded_motion import RecordedMotion
+
 REMEMBERED_VALUES = 8_000_000
-"""Numbers kept in memory over all runs: 64 MB."""
+"""Numbers kept in memory over all runs, and as many over all motions: 64 MB."""
 
 
 class Recordings:
-    """Runs of measurements, the most recently used ones in memory."""
+    """Runs of measurements and what they prescribe, the most recently used ones in memory."""
 
     def __init__(self, store: Store):
         self._store = store
-        self._runs: OrderedDict[str, Run] = OrderedDict()
-        self._lock = threading.Lock()
+        self._runs: Remembered[str, Run] = Remembered(REMEMBERED_VALUES)
+        self._motions: Remembered[Any, RecordedMotion] = Remembered(REMEMBERED_VALUES)
 
     def run(self, measurement: Measurement) -> Run:
         """The parsed recording under the measurement's name, with its noise."""
-        with self._lock:
-            run = self._runs.get(measurement.sha256)
-            if run is not None:
-                self._runs.move_to_end(measurement.sha256)
+        run = self._runs.get(measurement.sha256)
         if run is None:
             run = parse(self._store.original(measurement).read_bytes(), measurement.name)
-            self._remember(measurement.sha256, run)
+            self._runs.keep(measurement.sha256, run, len(run.time) * (1 + len(run.columns)))
         return replace(
             run,
             name=measurement.name,
@@ -44,13 +45,26 @@ class Recordings:
             warnings=(*run.warnings, *doubtful_noise(measurement.noise, run.channels)),
         )
 
-    def _remember(self, sha256: str, run: Run) -> None:
-        with self._lock:
-            self._runs[sha256] = run
-            while (
-                len(self._runs) > 1 and sum(map(_values, self._runs.values())) > REMEMBERED_VALUES
-            ):
-                self._runs.popitem(last=False)
+    def motion(
+        self,
+        measurement: Measurement,
+        settings: RimsSettings,
+        braking: Iterable[tuple[float, float]] | None,
+    ) -> "RecordedMotion":
+        """What the recording prescribes to every car, with its braking marked, if it is marked.
+
+        Noise and marks are no part of the motion, so that it outlives a change of them.
+        """
+        # It brings scipy, which is loaded with the first simulation.
+        from ..engine.recorded_motion import recorded_motion
+
+        run = with_braking(self.run(measurement), braking)
+        key = measurement.sha256, measurement.name, settings
+        motion = self._motions.get(key)
+        if motion is None:
+            motion = recorded_motion(run, settings)
+            self._motions.keep(key, motion, motion.stage_inputs.size)
+        return replace(motion, run=run)
 
 
 def parse(data: bytes, name: str, noise: Mapping[str, float] | None = None) -> Run:
@@ -99,7 +113,3 @@ def _channel(name: str, run: Run) -> Mapping[str, Any]:
         "maximum": float(values.max()),
         "rms": float(np.sqrt(np.mean(values**2))),
     }
-
-
-def _values(run: Run) -> int:
-    return len(run.time) * (1 + len(run.columns))

@@ -24,7 +24,7 @@ from ..engine.simulation import (
 from ..engine.vehicle import Vehicle
 from ..engine.vehicle_file import vehicle_from_json
 from .errors import InvalidRequest, NotFound, OverBudget
-from .recordings import Recordings, with_braking
+from .recordings import Recordings
 from .schemas import RimsRequest, SimulationRequest
 from .settings import Limits
 from .store import Measurement, Store
@@ -146,9 +146,8 @@ def _follow(
         vehicle,
         lambda: simulate_rims(
             vehicle,
-            with_braking(recordings.run(kept), rims.braking),
+            recordings.motion(kept, settings, rims.braking),
             traction=rims.traction,
-            settings=settings,
             model=model,
         ),
     )
