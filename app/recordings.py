@@ -12,9 +12,9 @@ import numpy as np
 
 from ..engine.channels import Run, channel
 from ..engine.errors import MeasurementError
+from ..engine.remembered import Remembered
 from ..engine.rims_settings import RimsSettings
 from ..engine.run_notes import doubtful_noise
-from .remembered import Remembered
 from .store import Measurement, Store
 
 if TYPE_CHECKING:

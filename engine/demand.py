@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
-from .equilibrium import static_loads
+from .equilibrium import loads_at_rest
 from .frames import CORNERS, CREEP_SPEED, GRAVITY
 from .road import Road
 from .vehicle import Vehicle
@@ -86,6 +86,12 @@ class Demand:
     road: Road | None
     posts: PostMotion | None = None
 
+    @property
+    def size(self) -> int:
+        """How many numbers its road and posts take."""
+        road = 0 if self.road is None else self.road.coefficients.size
+        return road + (0 if self.posts is None else self.posts.height.size)
+
 
 @dataclass(frozen=True, eq=False)
 class PointMassMotion:
@@ -103,7 +109,7 @@ class PointMassMotion:
 
 def rolling_resistance(vehicle: Vehicle) -> float:
     """Rolling resistance of the whole car at rest over its weight: sum fr_i W0_i / sum W0_i."""
-    loads = static_loads(vehicle).tyre_load
+    loads = loads_at_rest(vehicle).tyre_load
     resisted = sum(vehicle.axle_at(c).tyre.rolling_resistance * loads[c] for c in CORNERS)
     return resisted / sum(loads[c] for c in CORNERS)
 

@@ -10,20 +10,22 @@ The keys of each part are the fields of the record of that kind in `torque_laws`
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from .demand import Demand, PiecewiseLinear, PointMassMotion, PostMotion, point_mass_motion
 from .errors import ManoeuvreError
+from .frames import AXLES
 from .json_record import RecordReader, record_to_json
 from .json_text import read_json
 from .post_sweep import PostSweep
+from .remembered import Remembered
 from .road import Road
 from .road_specs import FlatRoad, Place, RoadSpec
 from .torque_laws import LONGEST, BrakeLaw, DriveLaw, Speed
-from .vehicle import Range, Vehicle
+from .vehicle import Pivot, Range, StabilizerBar, Suspension, Vehicle
 
 __all__ = [
     "Demand",
@@ -39,6 +41,16 @@ __all__ = [
 ROAD_MARGIN = 0.02
 """The road is longer than the point mass's way by this share and 10 m: the car's own way differs
 from it by less."""
+
+SPRUNG_SOMEHOW = {
+    "suspension": Suspension(stiffness=2e4, damping=2e3),
+    "stabilizer_bar": StabilizerBar(stiffness=0.0, damping=0.0),
+    "pivot": Pivot(distance=1.0, angle=0.0),
+}
+"""Parts of an axle on which a demand does not depend, of any car."""
+
+_DEMANDS: Remembered[Any, Demand] = Remembered(4_000_000)
+"""The last demands, by manoeuvre, car as far as it matters and road; sizes in numbers."""
 
 ORDER = (
     *("1", "2", "brake", "coast", "constant-speed-c", "bump", "pothole", "sine-sweep"),
@@ -86,7 +98,16 @@ class Manoeuvre:
         """What this manoeuvre asks of one car: its torques, and its road or posts.
 
         road : takes the place of the manoeuvre's own
+        The same object for cars that differ in their suspension alone, as a tuned one does.
         """
+        car = _sprung_somehow(vehicle)
+        demand = _DEMANDS.get((self, car, road))
+        if demand is None:
+            demand = self._demand(car, road)
+            _DEMANDS.keep((self, car, road), demand, demand.size)
+        return demand
+
+    def _demand(self, vehicle: Vehicle, road: Road | None) -> Demand:
         drive = brake = PiecewiseLinear.zero(self.duration)
         if self.drive is not None:
             drive = self.drive.wheel_torque(vehicle, self.initial_speed, self.duration)
@@ -113,6 +134,12 @@ class Manoeuvre:
             torque_end=torque_end,
             end=farthest + contact + 10.0,
         )
+
+
+def _sprung_somehow(vehicle: Vehicle) -> Vehicle:
+    """The car with the same springs, bars and pivots as every other."""
+    axles = {name: replace(vehicle.axle(name), **SPRUNG_SOMEHOW) for name in AXLES}
+    return replace(vehicle, source="", **axles)
 
 
 def manoeuvre_from_json(data: Any, source: str = "manoeuvre") -> Manoeuvre:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from .car_rows import car_rows
 from .channels import OUTPUT_CHANNELS, Run
+from .equilibrium import static_loads
 from .errors import ProblemError, VehicleError
 from .filters import low_pass, too_coarse
 from .parameters import PARAMETER_NAMES, default_bounds, parameter
@@ -125,6 +126,7 @@ class Problem:
         start = _by_name(start or {}, "start value")
         try:
             vehicle = vehicle.with_values(start)
+            static_loads(vehicle)
         except VehicleError as error:
             raise ProblemError(f"A start value cannot be used: {error}") from error
         names = _free_names(free, fixed)

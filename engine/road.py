@@ -8,6 +8,7 @@ height is held, so the road is C1 everywhere. On cell k, with s = (X - start)/sp
 """
 
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Literal
 
 import numpy as np
@@ -65,6 +66,7 @@ class Road:
         object.__setattr__(self, "coefficients", cells)
 
     @classmethod
+    @cache
     def flat(cls) -> "Road":
         """Level ground at height 0, as far as any car goes."""
         return cls(start=0.0, spacing=1.0, left=np.zeros(2), right=np.zeros(2), name="flat")

@@ -7,6 +7,7 @@ end of every step, at its ends from inside the step.
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from scipy.interpolate import CubicSpline
 
 from .demand import Demand
 from .errors import SimulationError
+from .remembered import Remembered
 from .road import Road
 from .step_limits import LONGEST_SAMPLE_STEP, LONGEST_STEP, SHORTEST_STEP
 
@@ -49,11 +51,23 @@ class FreeInputs:
     initial_speed: float
 
 
+_PREPARED: Remembered[Any, FreeInputs] = Remembered(4_000_000)
+"""The last inputs, by demand and steps; sizes in numbers."""
+
+
 def prepare_free(demand: Demand, step: float, sample_step: float) -> FreeInputs:
     """Steps no longer than `step` and samples every `sample_step` over a demand's duration.
 
     Raises SimulationError for a step, a sampling or an amount of memory outside what is accepted.
     """
+    inputs = _PREPARED.get((demand, step, sample_step))
+    if inputs is None:
+        inputs = _prepare(demand, step, sample_step)
+        _PREPARED.keep((demand, step, sample_step), inputs, inputs.stage_inputs.size)
+    return inputs
+
+
+def _prepare(demand: Demand, step: float, sample_step: float) -> FreeInputs:
     _check_number("step", step, SHORTEST_STEP, LONGEST_STEP)
     _check_number("sample_step", sample_step, SHORTEST_STEP, LONGEST_SAMPLE_STEP)
     if not (math.isfinite(demand.duration) and demand.duration >= sample_step):

@@ -18,6 +18,7 @@ from ridetune.engine.manoeuvre import (
     read_manoeuvre,
     reference_manoeuvres,
 )
+from ridetune.engine.parameters import PARAMETER_NAMES
 from ridetune.engine.road import LEFT, RIGHT
 from ridetune.engine.torque_laws import DriveTable
 from ridetune.engine.vehicle import Brakes
@@ -365,3 +366,29 @@ def test_the_documented_manoeuvres_are_read_and_driven():
     assert len(examples) == 2
     for example in examples:
         manoeuvre_from_json(json.loads(example)).demand(paper_vehicle())
+
+
+@pytest.mark.parametrize("key", KEYS)
+def test_a_demand_is_the_same_whatever_the_suspension(key):
+    """A tuned car is asked for what it was asked for before, and nothing is made anew."""
+    car, manoeuvre = paper_vehicle(), reference_manoeuvres()[key]
+    car = replace(car, brakes=Brakes(front_share=0.65))
+    tuned = car.with_values({name: 1.1 * car.value(name) for name in PARAMETER_NAMES})
+    assert manoeuvre.demand(tuned) is manoeuvre.demand(car)
+
+
+def test_a_demand_follows_every_other_number_of_the_car():
+    """Oracle: T = r M (a + fr g) / n on each driven wheel; the road begins at the front contact."""
+    car, manoeuvre = paper_vehicle(), reference_manoeuvres()["2"]
+    full = manoeuvre.demand(car).drive.values.max()
+    heavy = car.with_values({"chassis.mass": car.chassis.mass + car.total_mass})
+    assert manoeuvre.demand(heavy).drive.values.max() == pytest.approx(2.0 * full)
+    large = car.with_values({"rear.wheel.radius": 2.0 * car.rear.wheel.radius})
+    assert manoeuvre.demand(large).drive.values.max() == pytest.approx(2.0 * full)
+    both = replace(car, front=replace(car.front, driven=True))
+    assert manoeuvre.demand(both).drive.values.max() == pytest.approx(0.5 * full)
+    long = car.with_values({"front.cg_distance": 1.8})
+    assert manoeuvre.demand(long).road.start == pytest.approx(
+        manoeuvre.demand(car).road.start + 0.5
+    )
+    assert manoeuvre.demand(car).drive.values.max() == full

@@ -78,3 +78,15 @@ def test_steps_outside_what_is_accepted_are_refused(duration, step, sample_step,
     wrong = Demand(duration, 0.0, PiecewiseLinear.zero(1.0), PiecewiseLinear.zero(1.0), None, None)
     with pytest.raises(SimulationError, match=named):
         prepare_free(wrong, step, sample_step)
+
+
+def test_inputs_of_the_same_demand_are_made_once_for_each_pair_of_steps():
+    """Oracle: the inputs of an equal demand, made by itself."""
+    asked = demand()
+    inputs = prepare_free(asked, step=0.002, sample_step=0.005)
+    finer = prepare_free(asked, step=0.001, sample_step=0.005)
+    assert prepare_free(asked, step=0.002, sample_step=0.005) is inputs
+    assert finer.steps.size > inputs.steps.size
+    again = prepare_free(demand(), step=0.002, sample_step=0.005)
+    assert again is not inputs
+    assert np.array_equal(again.stage_inputs, inputs.stage_inputs)

@@ -1,4 +1,4 @@
-from ridetune.app.remembered import Remembered
+from ridetune.engine.remembered import Remembered
 
 
 def test_the_least_recently_used_is_forgotten_when_the_sizes_are_too_many():
