@@ -22,8 +22,8 @@ NO_FLOOR = -1e300
 """Least tyre load without the lift-off option: none."""
 
 AT_ONCE = 2048
-"""Cars whose rows are written together: they stay in a core's cache, where one number of all of
-them is written after the other."""
+"""Cars whose rows are written or read together, one number of all of them after the other, so that
+they stay in a core's cache."""
 
 
 def body_record(vehicle: Vehicle) -> Body:

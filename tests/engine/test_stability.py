@@ -18,13 +18,17 @@ from ridetune.engine.rims import prepare
 from ridetune.engine.rims_settings import RimsSettings
 from ridetune.engine.simulation import rims_batch, simulate_posts, simulate_rims, simulate_road
 from ridetune.engine.stability import (
+    HALF_DISC,
     MARGIN,
     check_free_step,
     check_rims_step,
     eigenvalues,
     largest_stable_step,
+    road_eigenvalues,
     stable_on_rims,
+    stable_on_road,
 )
+from ridetune.engine.step_bound import fastest_on_road
 from ridetune.engine.stepping import prepare_free
 from ridetune.engine.vehicle_file import reference_vehicles
 
@@ -146,6 +150,56 @@ def test_many_cars_at_once_are_judged_like_each_alone():
 
 def rows(*cars):
     return np.stack([car_row(car) for car in cars])
+
+
+def lively(rng, count):
+    """Random cars, one in two braking, some with dampers and tyres of a lorry."""
+    names = ["front.suspension.damping", "rear.tyre.stiffness"]
+    cars, brakes = [], []
+    for _ in range(count):
+        numbers = 10.0 ** rng.uniform([2.5, 5.0], [5.5, 7.0])
+        cars.append(random_vehicle(rng).with_values(dict(zip(names, numbers, strict=True))))
+        brakes.append(np.repeat(10.0 ** rng.uniform(0.0, 4.5, 2), 2) * (rng.random() < 0.5))
+    return rows(*cars), np.array(brakes)
+
+
+def test_no_motion_of_a_car_on_a_road_is_faster_than_its_bound():
+    """Oracle: eigenvalues of the equations of motion, differences of which err by 1e-6."""
+    cars, brakes = lively(np.random.default_rng(3), 300)
+    fastest = np.abs(road_eigenvalues(cars, brakes)).max(axis=1)
+    share = fastest / fastest_on_road(cars, brakes)
+    assert share.max() < 1.0 + 1e-6
+    assert np.median(share) > 0.3
+
+
+@pytest.mark.parametrize("angle", np.linspace(90.0, 180.0, 91))
+def test_the_half_disc_is_stable(angle):
+    """Oracle: the four stages of a Runge-Kutta step of y' = z y, written out."""
+    z = HALF_DISC * np.exp(1j * np.radians(angle))
+    k1 = z
+    k2 = z * (1.0 + 0.5 * k1)
+    k3 = z * (1.0 + 0.5 * k2)
+    k4 = z * (1.0 + k3)
+    assert abs(1.0 + (k1 + 2.0 * k2 + 2.0 * k3 + k4) / 6.0) <= 1.0 + 1e-12
+
+
+def test_many_cars_on_a_road_are_judged_like_each_alone():
+    """Oracle: the walk along the ray of each eigenvalue of each car."""
+    cars, brakes = lively(np.random.default_rng(4), 120)
+    for step in (0.0005, 0.002, 0.01):
+        expected = [
+            MARGIN * largest_stable_step(values) > step for values in road_eigenvalues(cars, brakes)
+        ]
+        assert list(stable_on_road(cars, brakes, step)) == expected
+        assert 0 < sum(expected) < len(expected)
+
+
+def test_an_impossible_car_takes_no_step():
+    possible = rows(paper_vehicle())
+    cars = np.vstack([np.full_like(possible, np.nan), possible])
+    assert list(stable_on_road(cars, np.zeros(4), 0.002)) == [False, True]
+    assert list(stable_on_rims(cars, 0.005)) == [False, True]
+    assert list(stable_on_rims(cars[:1], 0.005)) == [False]
 
 
 def ride(car):
