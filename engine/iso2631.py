@@ -14,6 +14,7 @@ appended so that the filter's end does not wrap around into the beginning.
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -82,7 +83,13 @@ def weighted(acceleration: Array, step: float, weighting: Weighting) -> Array:
     count = acceleration.size
     size = int(next_fast_len(count + math.ceil(SETTLING / step), real=True) or 0)
     spectrum = np.fft.rfft(acceleration, size)
-    return np.fft.irfft(spectrum * response(weighting, np.fft.rfftfreq(size, step)), size)[:count]
+    return np.fft.irfft(spectrum * _spectrum_response(weighting, size, step), size)[:count]
+
+
+@lru_cache(maxsize=8)
+def _spectrum_response(weighting: Weighting, size: int, step: float) -> NDArray[np.complex128]:
+    """H at the frequencies of a spectrum, which takes as long to find as to use."""
+    return response(weighting, np.fft.rfftfreq(size, step))
 
 
 def vibration_dose(history: Array, step: float) -> float:
