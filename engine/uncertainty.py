@@ -31,6 +31,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import next_fast_len
 from scipy.stats import t as student_t
 
 from .condensed import triangle
@@ -110,8 +111,9 @@ def smoothed_autocovariance(residuals: Array) -> Array:
     The mean is not removed: a constant misfit is an error like any other.
     """
     count = len(residuals)
-    power = np.abs(np.fft.rfft(residuals, 2 * count)) ** 2
-    autocovariance = np.fft.irfft(power)[:count] / count
+    length = _fast_length(2 * count)
+    power = np.abs(np.fft.rfft(residuals, length)) ** 2
+    autocovariance = np.fft.irfft(power, length)[:count] / count
     if autocovariance[0] == 0.0:
         return autocovariance[:1]
     p = float(np.clip(autocovariance[1] / autocovariance[0], -0.9999, 0.9999))
@@ -123,7 +125,7 @@ def smoothed_autocovariance(residuals: Array) -> Array:
 
 def _toeplitz_product(jacobian: Array, autocovariance: Array) -> Array:
     """J^T G J for the Toeplitz matrix G of the autocovariances, through the Fourier transform."""
-    length = len(jacobian) + len(autocovariance)
+    length = _fast_length(len(jacobian) + len(autocovariance))
     spectrum = 2.0 * np.fft.rfft(autocovariance, length).real - autocovariance[0]
     transformed = np.fft.rfft(jacobian, length, axis=0)
     weights = np.full(len(spectrum), 2.0)
@@ -132,6 +134,11 @@ def _toeplitz_product(jacobian: Array, autocovariance: Array) -> Array:
         weights[-1] = 1.0
     weighted = (weights * spectrum)[:, np.newaxis] * transformed
     return (transformed.conj().T @ weighted).real / length
+
+
+def _fast_length(least: int) -> int:
+    """A length of at least so much whose Fourier transform is quick."""
+    return int(next_fast_len(least, real=True) or 0)
 
 
 def _effective_samples(autocovariance: Array, count: int) -> float:
