@@ -67,6 +67,13 @@ class RimsInputs:
         """(samples,) the node nearest to each sample."""
         return self.sample_step + np.rint(self.sample_fraction).astype(np.int64)
 
+    @property
+    def seen_nodes(self) -> NDArray[np.int64] | slice:
+        """The nodes that are samples; every node where none is left out or samples lie between."""
+        if self.on_nodes and len(self.time) < len(self.node_time):
+            return self.sample_node
+        return slice(None)
+
     def at_samples(self, values: Array, rates: Array) -> Array:
         """Nodal values (..., steps + 1, k) carried to the samples: (..., samples, k).
 

@@ -277,8 +277,7 @@ def _rims_run(vehicle: Vehicle, inputs: RimsInputs, traction: Traction, points: 
             car, states.values[0, node - 1 : node], nodal[node : node + 1], exact
         )[0],
     )
-    seen = inputs.sample_node if inputs.on_nodes else slice(None)
-    motion, given = states.values[0, seen], nodal[seen]
+    motion, given = states.values[0, inputs.seen_nodes], nodal[inputs.seen_nodes]
     outputs = rims_outputs(car, motion, given, exact)
     channels = common_channels(motion, outputs, points)
     channels |= traction_torques(vehicle, outputs, given[:, 14])
