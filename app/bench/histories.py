@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...engine.car_rows import car_row, car_rows
+from ...engine.car_rows import car_row
 from ...engine.demand import Demand
 from ...engine.frames import CORNERS, CREEP_SPEED
 from ...engine.integration import free_outputs, free_states
@@ -47,7 +47,7 @@ def histories(vehicle: Vehicle, demand: Demand, step: float) -> Histories:
     """Our own run of a demand with steps FINER times shorter, for a peer's steps."""
     inputs = prepare_free(demand, step / FINER, step / 2)
     car = car_row(vehicle)
-    states = free_states(car_rows([vehicle]), inputs).values[0]
+    states = free_states(car_row(vehicle)[np.newaxis], inputs).values[0]
     outputs = free_outputs(car, states, inputs.sample_inputs, inputs.road)
     road = np.column_stack([corner_output(outputs, k, "road") for k in range(4)])
     longitudinal = np.column_stack([corner_output(outputs, k, "longitudinal") for k in range(4)])

@@ -94,17 +94,9 @@ def the_demand() -> Demand:
 def some_cars(count: int) -> Array:
     """So many rows like the reference car's (C, CAR_ROWS), their twelve parameters scattered."""
     rng = np.random.default_rng(0)
-    return car_rows(
-        [
-            the_car().with_values(
-                {
-                    name: the_car().value(name) * (1.0 + rng.uniform(-SPREAD, SPREAD))
-                    for name in PARAMETER_NAMES
-                }
-            )
-            for _ in range(count)
-        ]
-    )
+    usual = np.array([the_car().value(name) for name in PARAMETER_NAMES])
+    scattered = usual * (1.0 + rng.uniform(-SPREAD, SPREAD, (count, usual.size)))
+    return car_rows(the_car(), PARAMETER_NAMES, scattered)
 
 
 def road_mode(demand: Demand | None = None, sample_step: float = SAMPLE_STEP) -> Mode:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from llvmlite.binding import get_host_cpu_features
 from ridetune import engine
-from ridetune.engine.car_rows import car_rows
+from ridetune.engine.car_rows import car_row
 from ridetune.engine.integration import free_states, rims_states
 from ridetune.engine.jit import ARITHMETIC
 from ridetune.engine.kernels.integrate import integrate_free, integrate_rims
@@ -48,7 +48,7 @@ def test_a_batch_s_arithmetic_is_packed(kernel):
 def drive_a_batch():
     """Call both kernels with more than one car, so that their signatures are known."""
     vehicle, heave = paper_vehicle(), reference_manoeuvres()["heave"]
-    rows = car_rows([vehicle, vehicle])
+    rows = np.stack([car_row(vehicle)] * 2)
     free_states(rows, prepare_free(heave.demand(vehicle), 0.0025, 0.1))
     run = simulate_posts(vehicle, heave).run
     rims_states(rows, prepare(run, vehicle), True)

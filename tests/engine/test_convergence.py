@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.engine.car_rows import car_rows
+from ridetune.engine.car_rows import car_row
 from ridetune.engine.channels import WHEEL_CHANNELS, Run
 from ridetune.engine.demand import Demand, PiecewiseLinear, PostMotion
 from ridetune.engine.integration import free_states
@@ -45,7 +45,7 @@ def error(history, converged):
 
 def free_motion(vehicle, demand, step):
     """Coordinates (S, 7) but x, on the road or the rig."""
-    states = free_states(car_rows([vehicle]), prepare_free(demand, step, SAMPLE_STEP))
+    states = free_states(car_row(vehicle)[np.newaxis], prepare_free(demand, step, SAMPLE_STEP))
     return states.values[0, :, 1:8]
 
 
@@ -73,7 +73,7 @@ def test_the_rims_integrator_is_of_fourth_order():
     vehicle, histories = paper_vehicle(), []
     for k in range(4):
         inputs = prepare(run, vehicle, replace(settings, step=0.02 / 2**k))
-        histories.append(rims_batch([vehicle], inputs, "exact")[0])
+        histories.append(rims_batch(car_row(vehicle)[np.newaxis], inputs, "exact")[0])
     assert_allclose(orders(histories), 4.0, rtol=0, atol=0.2)
 
 
@@ -100,8 +100,8 @@ def test_the_default_step_is_near_the_converged_run_on_rims(manoeuvre):
     vehicle = paper_vehicle()
     run = simulate_road(vehicle, reference_manoeuvres()[manoeuvre]).run
     settings = RimsSettings()
-    fine = replace(settings, step=settings.step / 16)
+    fine, row = replace(settings, step=settings.step / 16), car_row(vehicle)[np.newaxis]
     found, converged = (
-        rims_batch([vehicle], prepare(run, vehicle, how), "exact")[0] for how in (settings, fine)
+        rims_batch(row, prepare(run, vehicle, how), "exact")[0] for how in (settings, fine)
     )
     assert error(found, converged) < NEAR

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.engine.car_rows import car_rows
+from ridetune.engine.car_rows import car_row, car_rows
 from ridetune.engine.integration import free_states, free_tallies, rims_states, rims_tallies
 from ridetune.engine.kernels.histogram import BINS, LOAD_FROM, LOAD_TO, TRAVEL_FROM, TRAVEL_TO
 from ridetune.engine.manoeuvre import reference_manoeuvres
@@ -69,7 +69,7 @@ def test_tallied_figures_are_those_of_each_car_s_history(manoeuvre):
     run = simulate(vehicle, driven).run
     inputs = prepare_free(driven.demand(vehicle), FREE_STEP, SAMPLE_STEP)
     reduced = reduction(run, inputs.steps, POINT, POSITION)
-    found = figures(free_tallies(car_rows([vehicle]), inputs, reduced).values, reduced)
+    found = figures(free_tallies(car_row(vehicle)[np.newaxis], inputs, reduced).values, reduced)
     compare({name: values[0] for name, values in found.items()}, run, vehicle)
 
 
@@ -81,7 +81,7 @@ def test_tallied_figures_on_rims_are_those_of_the_history():
     inputs = prepare(recording, other)
     run = simulate_rims(other, recording).run
     reduced = reduction(run, np.diff(inputs.node_time), POINT, POSITION)
-    tallies = rims_tallies(car_rows([other]), inputs, True, reduced)
+    tallies = rims_tallies(car_row(other)[np.newaxis], inputs, True, reduced)
     found = figures(tallies.values, reduced)
     compare({name: values[0] for name, values in found.items()}, run, other)
 
@@ -96,7 +96,7 @@ def random_rows(count):
     rng, vehicle = np.random.default_rng(5), paper_vehicle()
     names = ("front.suspension.stiffness", "rear.suspension.damping", "rear.pivot.distance")
     values = rng.uniform([15e3, 800.0, 0.6], [40e3, 3000.0, 2.0], (count, 3))
-    return car_rows([vehicle.with_values(dict(zip(names, row, strict=True))) for row in values])
+    return car_rows(vehicle, names, values)
 
 
 @pytest.mark.parametrize("count", [1, 7, 8, 9, 64, 1000])
@@ -140,8 +140,8 @@ def test_a_failed_car_spoils_neither_its_batch_nor_the_next(short):
     inputs = prepare_free(short.demand(vehicle), FREE_STEP, SAMPLE_STEP)
     reduced = reduction(simulate_road(vehicle, short).run, inputs.steps, POINT, POSITION)
     sound = free_tallies(rows, inputs, reduced, threads=1)
-    broken = car_rows([vehicle.with_values({"front.suspension.damping": 1e5})])
-    mixed = np.insert(rows, 3, broken[0], axis=0)
+    broken = car_row(vehicle.with_values({"front.suspension.damping": 1e5}))
+    mixed = np.insert(rows, 3, broken, axis=0)
     found = free_tallies(mixed, inputs, reduced, threads=1)
     assert found.failed[3] >= 0
     assert np.array_equal(np.delete(found.values, 3, axis=0), sound.values)
