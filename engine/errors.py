@@ -68,6 +68,12 @@ class ProblemError(RideError):
     code = "identification"
 
 
+class SweepError(RideError):
+    """A sweep cannot be set up: its parameters, levels or ranges, or how much it asks for."""
+
+    code = "sweep"
+
+
 class Cancelled(RideError):
     """The caller asked for the work to stop."""
 
