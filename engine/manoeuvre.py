@@ -25,7 +25,7 @@ from .remembered import Remembered
 from .road import Road
 from .road_specs import FlatRoad, Place, RoadSpec
 from .torque_laws import LONGEST, BrakeLaw, DriveLaw, Speed
-from .vehicle import Pivot, Range, StabilizerBar, Suspension, Vehicle
+from .vehicle import Pivot, Range, StabilizerBar, Suspension, Vehicle, field_types
 
 __all__ = [
     "Demand",
@@ -93,6 +93,16 @@ class Manoeuvre:
             )
         if self.kind == "road" and self.posts is not None:
             raise ManoeuvreError('"posts" belongs to kind "posts"; remove it or change the kind.')
+
+    def lasting(self, duration: float) -> "Manoeuvre":
+        """This manoeuvre with another duration, s."""
+        accepted = field_types(Manoeuvre)["duration"][1]
+        if accepted is not None and not accepted.holds(duration):
+            raise ManoeuvreError(
+                f"A duration of {duration:g} s is asked for, but it must lie {accepted}; correct"
+                " it."
+            )
+        return replace(self, duration=duration)
 
     def demand(self, vehicle: Vehicle, road: Road | None = None) -> Demand:
         """What this manoeuvre asks of one car: its torques, and its road or posts.

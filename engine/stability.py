@@ -65,7 +65,7 @@ def stable_on_road(cars: Array, brake: Array, step: float) -> NDArray[np.bool_]:
         some = slice(first, first + AT_ONCE)
         within = step / MARGIN * fastest_on_road(cars[some], brakes[some]) <= HALF_DISC
         undecided = ~within & np.isfinite(cars[some, 0])
-        within[undecided] = _is_stable(
+        within[undecided] = is_stable(
             step, road_eigenvalues(cars[some][undecided], brakes[some][undecided])
         )
         stable[some] = within
@@ -92,8 +92,8 @@ def check_rims_step(car: Array, step: float) -> None:
     """Raise SimulationError for a step too long for a car on its rims, where z, pitch and roll are
     left; arguments as of `check_free_step`.
     """
-    values = _rims_eigenvalues(car[np.newaxis])[0]
-    if not _is_stable(step, values):
+    values = rims_eigenvalues(car[np.newaxis])[0]
+    if not is_stable(step, values):
         _refuse(step, values)
 
 
@@ -102,11 +102,11 @@ def stable_on_rims(cars: Array, step: float) -> NDArray[np.bool_]:
     for, as data (C,); an impossible car (not a number) takes none.
     """
     stable = np.isfinite(cars[:, 0])
-    stable[stable] = _is_stable(step, _rims_eigenvalues(cars[stable]))
+    stable[stable] = is_stable(step, rims_eigenvalues(cars[stable]))
     return stable
 
 
-def _rims_eigenvalues(cars: Array) -> NDArray[np.complex128]:
+def rims_eigenvalues(cars: Array) -> NDArray[np.complex128]:
     """Eigenvalues (C, 6), 1/s, of many cars on their rims."""
 
     def accelerations(q: Array, rates: Array) -> Array:
@@ -162,7 +162,7 @@ def _growth(z: NDArray[np.complex128]) -> Array:
     return np.abs(1.0 + z * (1.0 + z * (0.5 + z * (1.0 / 6.0 + z / 24.0))))
 
 
-def _is_stable(step: float, values: NDArray[np.complex128]) -> NDArray[np.bool_]:
+def is_stable(step: float, values: NDArray[np.complex128]) -> NDArray[np.bool_]:
     """Whether a step lies within MARGIN of the limit, for eigenvalues (..., n): on a ray RK4 is
     stable up to the limit and nowhere beyond, so that no search is needed.
     """
@@ -170,12 +170,24 @@ def _is_stable(step: float, values: NDArray[np.complex128]) -> NDArray[np.bool_]
 
 
 def _refuse(step: float, values: NDArray[np.complex128]) -> NoReturn:
+    raise too_long(
+        step,
+        values,
+        "this car",
+        "correct its stiffest spring, damper, bar or tyre, its lightest wheel or its pivot"
+        " distances",
+    )
+
+
+def too_long(
+    step: float, values: NDArray[np.complex128], whose: str, remedy: str
+) -> SimulationError:
+    """The refusal of a step, s, for a car with some eigenvalues; says the longest accepted one."""
     longest = _rounded_down(1e3 * MARGIN * largest_stable_step(values))
     fastest = float(np.abs(values).max())
-    raise SimulationError(
-        f"The step of {1e3 * step:.3g} ms is too long for this car, whose fastest motion changes at"
-        f" {fastest:.3g} 1/s; take a step of at most {longest:g} ms, or correct its"
-        " stiffest spring, damper, bar or tyre, its lightest wheel or its pivot distances."
+    return SimulationError(
+        f"The step of {1e3 * step:.3g} ms is too long for {whose}, whose fastest motion changes at"
+        f" {fastest:.3g} 1/s; take a step of at most {longest:g} ms, or {remedy}."
     )
 
 
