@@ -88,5 +88,6 @@ def test_every_dependency_is_pinned():
     def names(requirements: list[str]) -> set[str]:
         return {normalized(re.split(r"[\[<>=!~; ]", text)[0]) for text in requirements}
 
-    assert names(PYPROJECT["project"]["dependencies"] + groups["build"]) <= runtime
+    extras = PYPROJECT["project"]["optional-dependencies"]["sweep"]
+    assert names(PYPROJECT["project"]["dependencies"] + extras + groups["build"]) <= runtime
     assert names(groups["test"]) <= testing
