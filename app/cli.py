@@ -58,6 +58,7 @@ def command_line() -> "Parser":
 
     _describe_serve(add("serve", _serve, "Serve the page and the REST interface."))
     _describe_simulate(add("simulate", _simulate, "Simulate a car on a road, from rims or posts."))
+    _describe_sweep(add("sweep", _sweep, "Simulate many cars, one row a car."))
     _describe_identify(add("identify", _identify, "Identify a car's parameters from recordings."))
     _describe_campaign(add("campaign", _campaign, "Make the two manoeuvres' measurement files."))
     _describe_bench(add("bench", _bench, "Measure the engine and its peers on this machine."))
@@ -136,18 +137,47 @@ def _describe_serve(command: Parser) -> None:
 
 
 def _describe_simulate(command: Parser) -> None:
-    _add_vehicle(command)
-    drive = command.add_mutually_exclusive_group(required=True)
-    drive.add_argument("--manoeuvre", metavar="NAME", help="1, 2, another known one, or a file")
-    drive.add_argument("--rims", metavar="RUN", help="recording whose rims and a_x drive the car")
-    drive.add_argument("--posts", metavar="RUN", help="recording of a four-post rig's post.*.z")
-    command.add_argument("--road", metavar="FILE", help="road file in place of the manoeuvre's")
+    _add_excitation(command)
     command.add_argument("--model", choices=("8dof", "7dof"), default="8dof")
-    command.add_argument("--lift-off", action="store_true", help="no tyre pulls at the road")
-    _add_rims_mode(command, "--braking 6.2:9.8")
-    _add_step(command, "2.5 ms unless told, 5 ms with --rims")
-    command.add_argument("--seed", metavar="N", type=_seed, help="another random road")
+    command.add_argument(
+        "--seed", metavar="N", type=_seed, dest="road_seed", help="another random road"
+    )
     command.add_argument("-o", "--output", metavar="FILE", help="the run as CSV")
+
+
+def _describe_sweep(command: Parser) -> None:
+    _add_excitation(command)
+    several = {"nargs": "+", "action": "extend", "default": []}
+    command.add_argument(
+        "--levels",
+        metavar="NAME=LOW:HIGH:COUNT",
+        **several,
+        help="every combination of levels, SI units; or NAME=V1,V2,...",
+    )
+    command.add_argument(
+        "--range", metavar="NAME=LOW:HIGH", **several, help="cars drawn from a box, SI units"
+    )
+    command.add_argument("--cars", metavar="N", help="how many are drawn")
+    command.add_argument(
+        "--design", choices=("sobol", "latin-hypercube"), help="how; sobol unless told"
+    )
+    command.add_argument("--seed", metavar="N", type=_seed, help="other cars")
+    command.add_argument("--threads", metavar="N", type=int, help="one a core unless told")
+    command.add_argument(
+        "--histories",
+        metavar=("DIR", "N"),
+        nargs="+",
+        help="also the histories of these cars, as CSV into a folder",
+    )
+    command.add_argument("--force", action="store_true", help="write over histories")
+    command.add_argument(
+        "-o",
+        "--output",
+        metavar="FILE",
+        required=True,
+        help="the rows; .parquet, .arrow, .feather or .csv",
+    )
+    command.set_defaults(road_seed=None)
 
 
 def _describe_identify(command: Parser) -> None:
@@ -185,6 +215,20 @@ def _describe_bench(command: Parser) -> None:
         "--quick", action="store_true", help="fewer repetitions, and no start-up rows"
     )
     command.add_argument("-o", "--output", metavar="FILE", help="the table as JSON")
+
+
+def _add_excitation(command: Parser) -> None:
+    """A vehicle and what drives it."""
+    _add_vehicle(command)
+    drive = command.add_mutually_exclusive_group(required=True)
+    drive.add_argument("--manoeuvre", metavar="NAME", help="1, 2, another known one, or a file")
+    drive.add_argument("--rims", metavar="RUN", help="recording whose rims and a_x drive the car")
+    drive.add_argument("--posts", metavar="RUN", help="recording of a four-post rig's post.*.z")
+    command.add_argument("--road", metavar="FILE", help="road file in place of the manoeuvre's")
+    command.add_argument("--duration", metavar="S", type=float, help="in place of the manoeuvre's")
+    command.add_argument("--lift-off", action="store_true", help="no tyre pulls at the road")
+    _add_rims_mode(command, "--braking 6.2:9.8")
+    _add_step(command, "2.5 ms unless told, 5 ms with --rims")
 
 
 def _add_vehicle(command: Parser) -> None:
@@ -244,6 +288,12 @@ def _simulate(options: argparse.Namespace) -> None:
     from .commands.simulate import simulate
 
     simulate(options)
+
+
+def _sweep(options: argparse.Namespace) -> None:
+    from .commands.sweep import sweep
+
+    sweep(options)
 
 
 def _identify(options: argparse.Namespace) -> None:

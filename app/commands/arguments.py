@@ -1,19 +1,23 @@
-"""What is written in arguments: NAME=VALUE, NAME=LOW:HIGH, [RUN=]BEGIN:END, a frequency."""
+"""What is written in arguments: NAME=VALUE, NAME=LOW:HIGH, NAME=LOW:HIGH:COUNT, [RUN=]BEGIN:END, a
+frequency, a whole number.
+"""
 
 import math
 from argparse import Namespace
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from ...engine.braking import Interval
+from ...engine.designs import Spaced
 from ...engine.errors import RideError
-from ...engine.parameters import parameter
+from ...engine.parameters import number_path, parameter
 from ...engine.rims_settings import RimsSettings
 
 VALUE = "NAME=VALUE in SI units"
 LIMITS = "NAME=LOW:HIGH in SI units"
+LEVELS = "NAME=LOW:HIGH:COUNT or NAME=V1,V2,... in SI units"
 FREQUENCY = "a frequency in Hz, or none"
 INTERVAL = "BEGIN:END in seconds, or none"
 
@@ -42,6 +46,43 @@ def bounds(assignments: Iterable[str]) -> dict[str, tuple[float, float]]:
         name, text = _assigned(assignment, argument, LIMITS, limits)
         limits[name] = _two_numbers(text, argument, LIMITS)
     return limits
+
+
+def ranges(assignments: Iterable[str]) -> dict[str, tuple[float, float]]:
+    """(low, high) by path of any number of a vehicle, out of NAME=LOW:HIGH."""
+    limits = {}
+    for assignment in assignments:
+        argument = f"--range {assignment}"
+        name, text = _assigned(assignment, argument, LIMITS, limits, number_path)
+        limits[name] = _two_numbers(text, argument, LIMITS)
+    return limits
+
+
+def levels(assignments: Iterable[str]) -> dict[str, Spaced | list[float]]:
+    """Levels by path of any number of a vehicle, out of NAME=LOW:HIGH:COUNT or NAME=V1,V2,..."""
+    found: dict[str, Spaced | list[float]] = {}
+    for assignment in assignments:
+        argument = f"--levels {assignment}"
+        name, text = _assigned(assignment, argument, LEVELS, found, number_path)
+        match text.split(":"):
+            case [low, high, count]:
+                first, last = (_number(end, argument, LEVELS) for end in (low, high))
+                found[name] = Spaced(first, last, whole(count, argument, LEVELS))
+            case [values]:
+                found[name] = [_number(value, argument, LEVELS) for value in values.split(",")]
+            case _:
+                raise ArgumentError(f"{argument} lacks a count; write {LEVELS}.")
+    return found
+
+
+def whole(text: str, argument: str, form: str) -> int:
+    """A whole number, which may be written like 1e6; other arguments as of a number's."""
+    with suppress(ValueError):
+        return int(text)
+    number = _number(text, argument, form)
+    if number % 1.0:
+        raise ArgumentError(f"{argument}: {text!r} is not a whole number; write {form}.")
+    return int(number)
 
 
 def rims_settings(options: Namespace) -> RimsSettings:
@@ -105,12 +146,23 @@ def _intervals(marks: Sequence[str], path: str) -> tuple[Interval, ...]:
     return ()
 
 
-def _assigned(assignment: str, argument: str, form: str, earlier: Iterable[str]) -> tuple[str, str]:
-    """The parameter that is set, and to what; each is set once."""
+def _identified(name: str) -> str:
+    """Path of one of the twelve parameters."""
+    return parameter(name).name
+
+
+def _assigned(
+    assignment: str,
+    argument: str,
+    form: str,
+    earlier: Iterable[str],
+    path: Callable[[str], str] = _identified,
+) -> tuple[str, str]:
+    """The parameter that is set, by its `path`, and to what; each is set once."""
     name, _, text = assignment.partition("=")
     if not (name and text):
         raise ArgumentError(f"{argument} sets no parameter; write {form}.")
-    name = parameter(name).name
+    name = path(name)
     if name in earlier:
         raise ArgumentError(f"{argument} sets {name} a second time; set it once.")
     return name, text

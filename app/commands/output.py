@@ -3,8 +3,9 @@
 import contextlib
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import BinaryIO
 
 from ...engine.errors import RideError
 
@@ -16,16 +17,27 @@ class OutputError(RideError):
 
 
 def write_file(path: str | Path, text: str) -> None:
-    """Write a text file in one step: a reader sees the old content or the new, never a part."""
+    """Write a text file in one step, see `whole_file`."""
+    with whole_file(path) as stream:
+        stream.write(text.encode())
+
+
+@contextlib.contextmanager
+def whole_file(path: str | Path) -> Iterator[BinaryIO]:
+    """A stream to a file that appears with the end of the block: a reader sees the old content or
+    the new, never a part, and the old one where the block fails.
+    """
     path = Path(path)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    stream = path.is_relative_to("/dev") or (path.exists() and not path.is_file())
+    direct = path.is_relative_to("/dev") or (path.exists() and not path.is_file())
     try:
-        if stream:
-            path.write_text(text, encoding="utf-8", newline="")
+        if direct:
+            with path.open("wb") as stream:
+                yield stream
             return
         try:
-            temporary.write_text(text, encoding="utf-8", newline="")
+            with temporary.open("wb") as stream:
+                yield stream
             temporary.replace(os.path.realpath(path))
         except BaseException:
             with contextlib.suppress(OSError):
@@ -33,7 +45,8 @@ def write_file(path: str | Path, text: str) -> None:
             raise
     except OSError as error:
         raise OutputError(
-            f"{path}: the file cannot be written ({error.strerror}); choose another place with -o."
+            f"{path}: the file cannot be written ({error.strerror or error}); choose another place"
+            " with -o."
         ) from error
 
 
@@ -65,8 +78,7 @@ def refuse_input(path: str | Path, inputs: Iterable[str | Path | None]) -> None:
     for one in filter(None, inputs):
         if Path(one).exists() and Path(path).samefile(one):
             raise OutputError(
-                f"{path}: this is {one} itself, which the command reads; choose another place"
-                " with -o."
+                f"{path}: this is {one} itself, which the command reads; choose another place."
             )
 
 
@@ -77,7 +89,7 @@ def make_folder(path: str | Path) -> Path:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(
-            f"{path}: the folder cannot be made ({error.strerror}); choose another one with -o."
+            f"{path}: the folder cannot be made ({error.strerror}); choose another one."
         ) from error
     return path
 
@@ -89,8 +101,8 @@ def refuse_to_overwrite(paths: Iterable[Path]) -> None:
     """
     if there := [path for path in paths if path.exists()]:
         raise OutputError(
-            f"{there[0]}: the file is there already; choose another folder with -o, or write over"
-            " it with --force."
+            f"{there[0]}: the file is there already; choose another folder, or write over it with"
+            " --force."
         )
 
 
