@@ -2,7 +2,7 @@
 
     owner.lock          locked while a service runs; says which process that is
     ridetune.sqlite     the database
-    originals/ab/...    uploads, byte for byte, each under its SHA-256
+    originals/ab/...    uploads, byte for byte, and what jobs made, each under its SHA-256
     dask/               scratch space of the job workers
 
 An original is written beside its place, flushed, renamed and the folder flushed, so that after a
@@ -81,7 +81,7 @@ class DataDirectory:
         return sha256
 
     def drop(self, sha256: str) -> None:
-        """Remove an original that no measurement refers to any more."""
+        """Remove an original that nothing refers to any more."""
         self.original(sha256).unlink(missing_ok=True)
 
     def sweep(self, kept: Collection[str]) -> None:

@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Connection, create_engine, event, insert, inspect, select
+from sqlalchemy import Connection, create_engine, event, insert, inspect, select, update
 
 from .errors import StartError
 from .tables import SCHEMA_VERSION, metadata, schema_version
@@ -67,7 +67,10 @@ def _check_schema(connection: Connection, path: Path) -> None:
         metadata.create_all(connection)
         connection.execute(insert(schema_version).values(version=SCHEMA_VERSION))
     version = connection.execute(select(schema_version.c.version)).scalar_one()
-    if version != SCHEMA_VERSION:
+    if version == 1:
+        metadata.create_all(connection)
+        connection.execute(update(schema_version).values(version=SCHEMA_VERSION))
+    elif version != SCHEMA_VERSION:
         raise StartError(
             f"The database {path} has schema version {version}, this ridetune needs "
             f"{SCHEMA_VERSION}; use the ridetune that wrote it, or another --data directory."

@@ -16,14 +16,16 @@ from sqlalchemy import Connection, Row, delete, func, insert, select, update
 from .database import Database
 from .errors import Busy, InvalidRequest, NotFound
 from .settings import Limits
-from .tables import jobs, results, sessions
+from .tables import job_files, jobs, results, sessions
 
 UNFINISHED = ("queued", "running")
 
 
 @dataclass(frozen=True)
 class Job:
-    """One background job; `spec` is everything needed to run it again."""
+    """One background job; `spec` is everything needed to run it again, `file` the SHA-256 of what
+    it made.
+    """
 
     id: str
     session: str
@@ -38,6 +40,7 @@ class Job:
     attempts: int
     restarts: int
     result: dict[str, Any] | None = None
+    file: str | None = None
 
     @property
     def ended(self) -> bool:
@@ -74,12 +77,12 @@ class JobStore:
             ).scalar_one()
             if unfinished >= self._limits.unfinished_jobs:
                 raise Busy(
-                    f"The session already has {unfinished} identifications under way; wait for "
-                    "one to end or cancel one.",
+                    f"The session already has {unfinished} jobs under way; wait for one to end or "
+                    "cancel one.",
                     retry_after=10,
                 )
             if total >= self._limits.session_jobs:
-                raise Busy(f"The session already keeps {total} identifications; delete some.")
+                raise Busy(f"The session already keeps {total} jobs; delete some.")
             job = secrets.token_hex(8)
             connection.execute(
                 insert(jobs).values(
@@ -103,23 +106,24 @@ class JobStore:
         with self._database.reading() as connection:
             return _known(connection, session, key, asked)
 
-    def get(self, session: str, job: str) -> Job:
-        """One job of a session, with its result."""
+    def get(self, session: str, job: str, kind: str | None = None) -> Job:
+        """One job of a session, of one kind if it is told, with its result."""
         with self._database.reading() as connection:
             row = connection.execute(
                 _select(jobs.c.session == session, jobs.c.id == job)
             ).one_or_none()
-            body = connection.execute(
-                select(results.c.body).where(results.c.job == job)
-            ).scalar_one_or_none()
-        if row is None:
-            raise NotFound("There is no identification with that id in this session.")
-        return _job(row, body)
+            body, file = (
+                connection.execute(select(column).where(table.c.job == job)).scalar_one_or_none()
+                for table, column in ((results, results.c.body), (job_files, job_files.c.sha256))
+            )
+        if row is None or kind not in (None, row.kind):
+            raise NotFound(f"There is no {kind or 'job'} with that id in this session.")
+        return _job(row, body, file)
 
-    def of_session(self, session: str) -> list[Job]:
-        """All jobs of a session, oldest first, without results."""
+    def of_session(self, session: str, kind: str) -> list[Job]:
+        """All jobs of a session and kind, oldest first, without results."""
         with self._database.reading() as connection:
-            query = _select(jobs.c.session == session).order_by(jobs.c.created)
+            query = _select(jobs.c.session == session, jobs.c.kind == kind).order_by(jobs.c.created)
             return [_job(row) for row in connection.execute(query)]
 
     def unfinished(self, session: str | None = None) -> list[Job]:
@@ -158,8 +162,12 @@ class JobStore:
         result: Mapping[str, Any] | None = None,
         error: Mapping[str, str] | None = None,
         progress: Mapping[str, Any] | None = None,
+        file: str | None = None,
     ) -> bool:
-        """Give a job its final state, with its result in the same commit; False if it had one."""
+        """Give a job its final state, with its result in the same commit; False if it had one.
+
+        file : SHA-256 of what it made, which is kept already
+        """
         values: dict[str, Any] = {"state": state, "finished": time.time()}
         if error is not None:
             values["error"] = json.dumps(dict(error))
@@ -171,6 +179,8 @@ class JobStore:
             )
             if ended.rowcount and result is not None:
                 connection.execute(insert(results).values(job=job, body=json.dumps(dict(result))))
+            if ended.rowcount and file is not None:
+                connection.execute(insert(job_files).values(job=job, sha256=file))
         return bool(ended.rowcount)
 
     def save_progress(self, job: str, progress: Mapping[str, Any]) -> None:
@@ -203,14 +213,14 @@ def _known(connection: Connection, session: str, key: str | None, asked: str) ->
     kept = _job(row)
     if kept.spec["asked"] != asked:
         raise InvalidRequest(
-            "The key is that of an identification that was asked for differently; give each a key"
-            " of its own.",
+            f"The key is that of another request, which {kept.kind} {kept.id} answers; give each a"
+            " key of its own.",
             field="key",
         )
     return kept
 
 
-def _job(row: Row[Any], result: str | None = None) -> Job:
+def _job(row: Row[Any], result: str | None = None, file: str | None = None) -> Job:
     return Job(
         id=row.id,
         session=row.session,
@@ -225,4 +235,5 @@ def _job(row: Row[Any], result: str | None = None) -> Job:
         attempts=row.attempts,
         restarts=row.restarts,
         result=json.loads(result) if result else None,
+        file=file,
     )

@@ -87,13 +87,13 @@ class Jobs:
         job = self._store.jobs.known(session, key, asked)
         return None if job is None else self._with_progress(job)
 
-    def get(self, session: str, job: str) -> Job:
-        """A job as it stands now."""
-        return self._with_progress(self._store.jobs.get(session, job))
+    def get(self, session: str, job: str, kind: str | None = None) -> Job:
+        """A job, of one kind if it is told, as it stands now."""
+        return self._with_progress(self._store.jobs.get(session, job, kind))
 
-    def of_session(self, session: str) -> list[Job]:
-        """All jobs of a session as they stand now."""
-        return [self._with_progress(job) for job in self._store.jobs.of_session(session)]
+    def of_session(self, session: str, kind: str) -> list[Job]:
+        """All jobs of a session and kind as they stand now."""
+        return [self._with_progress(job) for job in self._store.jobs.of_session(session, kind)]
 
     def cancel(self, session: str, job: str) -> Job:
         """Ask a job to stop; one that waits is cancelled at once, a final state stays."""
@@ -107,7 +107,7 @@ class Jobs:
         found = self._store.jobs.get(session, job)
         if not found.ended:
             self._stop(found)
-        self._store.jobs.delete(session, job)
+        self._store.delete_job(session, job)
         self._forget(job)
 
     def cancel_all(self, session: str) -> None:
@@ -157,6 +157,7 @@ class Jobs:
             result=ending["result"],
             error=ending["error"],
             progress=ending["progress"] or self._progress.get(task),
+            file=ending.get("file"),
         )
 
     def task_lost(self, task: str) -> None:
@@ -193,7 +194,7 @@ class Jobs:
         self._finish(job, "failed", error={"code": code, "detail": detail})
 
     def _finish(self, job: str, state: str, **found: Any) -> None:
-        self._store.jobs.finish(job, state, **found)
+        self._store.finish_job(job, state, **found)
         self._forget(job)
 
     def _send_again(self, task: str) -> None:

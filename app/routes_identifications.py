@@ -96,17 +96,17 @@ def _spec(services: Services, sid: str, body: IdentificationRequest) -> dict[str
 @router.get("")
 def all_of_session(sid: SessionId, services: Shared) -> list[dict[str, Any]]:
     """The session's identifications, oldest first, without results."""
-    return [job_to_json(job) for job in services.jobs.of_session(sid)]
+    return [job_to_json(job) for job in services.jobs.of_session(sid, KIND)]
 
 
 @router.get("/{jid}")
 def one(sid: SessionId, jid: str, services: Shared) -> dict[str, Any]:
     """One identification; `result` is a fit.json once it is done."""
-    return job_to_json(services.jobs.get(sid, jid), with_result=True)
+    return job_to_json(services.jobs.get(sid, jid, KIND), with_result=True)
 
 
 def _known(sid: SessionId, jid: str, services: Shared) -> Job:
-    return services.jobs.get(sid, jid)
+    return services.jobs.get(sid, jid, KIND)
 
 
 @router.get("/{jid}/events", response_class=EventSourceResponse)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Row, delete, func, insert, select, update
+from sqlalchemy import Connection, Row, delete, func, insert, select, update
 from sqlalchemy.dialects.sqlite import insert as insert_or
 
 from .data_directory import DataDirectory
@@ -23,7 +23,7 @@ from .database import Database
 from .errors import Busy, Conflict, NotFound, Unavailable
 from .job_store import JobStore
 from .settings import Limits
-from .tables import measurements, sessions, uploads
+from .tables import job_files, jobs, measurements, sessions, uploads
 
 SEEN_EVERY = 60.0
 UNUSED_AFTER = 3600.0
@@ -173,30 +173,18 @@ class Store:
     def add_measurement(self, session: str, new: NewMeasurement) -> Measurement:
         """Keep an original and what was found in it; `Busy` where the session is full."""
         with self._originals, self.database.writing() as connection:
-            mine = measurements.c.session == session
-            count, total = connection.execute(
-                select(func.count(), func.coalesce(func.sum(uploads.c.bytes), 0))
-                .select_from(measurements.join(uploads))
-                .where(mine)
-            ).one()
+            count = connection.execute(
+                select(func.count()).where(measurements.c.session == session)
+            ).scalar_one()
             if count >= self.limits.session_measurements:
                 raise Busy(f"The session already holds {count} measurements; delete one first.")
-            if total + len(new.data) > self.limits.session_bytes:
-                raise Busy(
-                    f"The session's measurements would exceed {self.limits.session_bytes / 1e6:g} "
-                    "MB together; delete one first."
-                )
+            self._require_room(connection, session, len(new.data))
             measurement = self._insert(connection, session, new, time.time())
             connection.execute(update(sessions).where(sessions.c.id == session).values(used=True))
         return self.measurement(session, measurement)
 
     def _insert(self, connection: Any, session: str, new: NewMeasurement, now: float) -> str:
-        sha256, measurement = self.directory.keep(new.data), secrets.token_hex(8)
-        connection.execute(
-            insert_or(uploads)
-            .values(sha256=sha256, bytes=len(new.data), created=now)
-            .on_conflict_do_nothing()
-        )
+        sha256, measurement = self._keep(connection, new.data, now), secrets.token_hex(8)
         connection.execute(
             insert(measurements).values(
                 id=measurement,
@@ -210,6 +198,30 @@ class Store:
             )
         )
         return measurement
+
+    def _keep(self, connection: Connection, data: bytes, now: float) -> str:
+        """Keep a file; its SHA-256."""
+        sha256 = self.directory.keep(data)
+        connection.execute(
+            insert_or(uploads)
+            .values(sha256=sha256, bytes=len(data), created=now)
+            .on_conflict_do_nothing()
+        )
+        return sha256
+
+    def _require_room(self, connection: Connection, session: str, more: int) -> None:
+        """Raise Busy where the session's files would become too large together."""
+        size = select(func.coalesce(func.sum(uploads.c.bytes), 0))
+        measured = size.select_from(measurements.join(uploads)).where(
+            measurements.c.session == session
+        )
+        made = size.select_from(jobs.join(job_files).join(uploads)).where(jobs.c.session == session)
+        total = sum(connection.execute(part).scalar_one() for part in (measured, made))
+        if total + more > self.limits.session_bytes:
+            raise Busy(
+                f"The session's measurements and sweeps would exceed "
+                f"{self.limits.session_bytes / 1e6:g} MB together; delete one first."
+            )
 
     def measurements(self, session: str) -> list[Measurement]:
         """All measurements of a session, oldest first."""
@@ -252,7 +264,7 @@ class Store:
         for job in self.jobs.unfinished(session):
             if measurement in job.measurements:
                 raise Conflict(
-                    f"The identification {job.id} is still using this measurement; cancel it first."
+                    f"The {job.kind} {job.id} is still using this measurement; cancel it first."
                 )
         self.measurement(session, measurement)
         with self._originals:
@@ -264,12 +276,40 @@ class Store:
                 )
             self._drop_unreferenced()
 
+    # Files of jobs
+
+    def require_room(self, session: str, more: int) -> None:
+        """Raise Busy where a session cannot keep so many bytes more."""
+        with self.database.reading() as connection:
+            self._require_room(connection, session, more)
+
+    def finish_job(self, job: str, state: str, *, file: bytes | None = None, **found: Any) -> bool:
+        """Give a job its final state, see `JobStore.finish`, and keep the file it made."""
+        if file is None:
+            return self.jobs.finish(job, state, **found)
+        with self._originals:
+            with self.database.writing() as connection:
+                sha256 = self._keep(connection, file, time.time())
+            ended = self.jobs.finish(job, state, file=sha256, **found)
+            if not ended:
+                self._drop_unreferenced()
+        return ended
+
+    def delete_job(self, session: str, job: str) -> None:
+        """Remove a job with its result and its file."""
+        with self._originals:
+            self.jobs.delete(session, job)
+            self._drop_unreferenced()
+
     def _drop_unreferenced(self) -> None:
-        """Remove originals without a measurement: first the rows, then the files."""
+        """Remove files of no measurement and no job: first the rows, then the files."""
         with self.database.writing() as connection:
-            unreferenced = uploads.c.sha256.not_in(select(measurements.c.sha256))
+            unreferenced = [
+                uploads.c.sha256.not_in(select(table.c.sha256))
+                for table in (measurements, job_files)
+            ]
             gone = connection.execute(
-                delete(uploads).where(unreferenced).returning(uploads.c.sha256)
+                delete(uploads).where(*unreferenced).returning(uploads.c.sha256)
             ).scalars()
             dropped = list(gone)
         for sha256 in dropped:

@@ -1,7 +1,7 @@
 """The tables of the service's database.
 
-Times are seconds since 1970. JSON is kept as text, written and read whole. An upload is one
-original file, kept once under its SHA-256 however many measurements are made of it.
+Times are seconds since 1970. JSON is kept as text, written and read whole. An upload is one file,
+kept once under its SHA-256 however many measurements are made of it; what a job makes is one too.
 """
 
 from sqlalchemy import (
@@ -18,7 +18,8 @@ from sqlalchemy import (
     UniqueConstraint,
 )
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
+"""Version 1 had no files of jobs."""
 
 metadata = MetaData()
 
@@ -90,7 +91,15 @@ results = Table(
     Column("body", Text, nullable=False),
 )
 
+job_files = Table(
+    "job_files",
+    metadata,
+    Column("job", String(32), ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True),
+    Column("sha256", String(64), ForeignKey("uploads.sha256"), nullable=False),
+)
+
 Index("measurements_of_session", measurements.c.session, measurements.c.created)
 Index("measurements_of_upload", measurements.c.sha256)
+Index("job_files_of_upload", job_files.c.sha256)
 Index("jobs_of_session", jobs.c.session, jobs.c.created)
 Index("jobs_by_state", jobs.c.state)

@@ -1,6 +1,7 @@
 """What runs inside a job worker: one task at a time, at the lowest priority, able to stop.
 
-A task is a function of (payload, report, cancelled). It is told to stop through a flag in this
+A task is a function of (payload, report, cancelled); it gives its result, with a file if it makes
+one. It is told to stop through a flag in this
 module, set by the worker's event loop while the task computes; it reports through the scheduler's
 event log, at most ten times a second, and always the whole progress, so nothing depends on the
 order or number of reports.
@@ -9,7 +10,8 @@ order or number of reports.
 import os
 import time
 from collections.abc import Callable, Mapping
-from typing import Any, Literal, TypedDict
+from dataclasses import dataclass
+from typing import Any, Literal, NotRequired, TypedDict
 
 from ..engine.errors import Cancelled, RideError
 
@@ -19,18 +21,29 @@ REPORT_EVERY = 0.1
 
 State = Literal["done", "failed", "cancelled"]
 Report = Callable[[Mapping[str, Any]], None]
-Task = Callable[[Any, Report, Callable[[], bool]], dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class WithFile:
+    """A task's result and the file it made."""
+
+    result: dict[str, Any]
+    file: bytes
+
+
+Task = Callable[[Any, Report, Callable[[], bool]], dict[str, Any] | WithFile]
 
 _asked_to_stop: set[str] = set()
 
 
 class Ending(TypedDict):
-    """How a task ended: its result, or the error a person can mend."""
+    """How a task ended: its result, perhaps with a file, or the error a person can mend."""
 
     state: State
     result: dict[str, Any] | None
     error: dict[str, str] | None
     progress: dict[str, Any]
+    file: NotRequired[bytes]
 
 
 def run(name: str, task: Task, payload: Any) -> Ending:
@@ -57,7 +70,10 @@ def run(name: str, task: Task, payload: Any) -> Ending:
 
     send(address=worker.address, process=os.getpid())
     try:
-        return ending("done", result=task(payload, report, lambda: name in _asked_to_stop))
+        found = task(payload, report, lambda: name in _asked_to_stop)
+        if isinstance(found, WithFile):
+            return {**ending("done", result=found.result), "file": found.file}
+        return ending("done", result=found)
     except Cancelled:
         return ending("cancelled")
     except RideError as error:

@@ -38,6 +38,13 @@ def ignore(payload, report, cancelled):
     return {"value": "never killed"}
 
 
+def write(payload, report, cancelled):
+    """Make a file."""
+    from ridetune.app.worker import WithFile
+
+    return WithFile({"rows": len(payload)}, payload)
+
+
 def poison(payload, report, cancelled):
     """Take the worker down."""
     os._exit(9)

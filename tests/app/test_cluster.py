@@ -72,6 +72,14 @@ def test_a_task_gives_its_result_and_reports_on_the_way(cluster, heard):
     assert told == [("double", {"cost": 1.0}), ("double", {"cost": 0.5})]
 
 
+def test_a_file_comes_back_byte_for_byte(cluster, heard):
+    data = bytes(range(256)) * 1000
+    cluster.submit("write", tasks.write, data, heard)
+    ending = heard.end_of("write")
+    assert ending["result"] == {"rows": len(data)}
+    assert ending["file"] == data
+
+
 def test_a_running_task_stops_when_asked(cluster, heard):
     cluster.submit("wait", tasks.wait, None, heard)
     heard.progress.get(timeout=PATIENCE)

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import pytest
 from ridetune.app.data_directory import DataDirectory
@@ -94,6 +95,24 @@ def test_a_database_of_another_version_is_refused(tmp_path):
     with pytest.raises(StartError, match="version 99"):
         Store(tmp_path, Limits())
     DataDirectory(tmp_path).close()
+
+
+def test_a_database_from_before_jobs_made_files_is_taken_over(tmp_path):
+    """Oracle: what version 1 kept; afterwards it keeps files like any other."""
+    store = Store(tmp_path, Limits())
+    session, _ = store.create_session(CAR, [recording()])
+    done, job = queued(store, session), queued(store, session)
+    store.jobs.finish(done, "done", result={"cost": 1.5})
+    store.close()
+    with sqlite3.connect(tmp_path / "ridetune.sqlite") as connection:
+        connection.execute("DROP TABLE job_files")
+        connection.execute("UPDATE schema_version SET version = 1")
+    connection.close()
+    store = Store(tmp_path, Limits())
+    assert store.jobs.get(session, done).result == {"cost": 1.5}
+    assert len(store.measurements(session)) == 1
+    assert store.finish_job(job, "done", result={}, file=b"rows")
+    store.close()
 
 
 def test_everything_is_there_after_reopening(tmp_path):
@@ -206,13 +225,17 @@ def test_the_same_key_is_the_same_job(store, session):
 def test_a_session_has_its_share_of_jobs(store, session):
     """Two under way, three kept in all."""
     first, _ = queued(store, session), queued(store, session)
-    with pytest.raises(Busy, match="2 identifications under way"):
+    with pytest.raises(Busy, match="2 jobs under way"):
         queued(store, session)
     store.jobs.finish(first, "done")
     store.jobs.finish(queued(store, session), "failed", error={"code": "x", "detail": "y"})
     with pytest.raises(Busy, match="delete some"):
         queued(store, session)
-    assert [job.state for job in store.jobs.of_session(session)] == ["done", "queued", "failed"]
+    assert [job.state for job in store.jobs.of_session(session, "test")] == [
+        "done",
+        "queued",
+        "failed",
+    ]
 
 
 def test_a_final_state_stays(store, session):
@@ -224,6 +247,58 @@ def test_a_final_state_stays(store, session):
     assert not store.jobs.requeue(job)
     kept = store.jobs.get(session, job)
     assert (kept.state, kept.result) == ("cancelled", None)
+
+
+def made(store: Store, session: str, data: bytes) -> tuple[str, Path]:
+    """A job that made a file, and where that is."""
+    job = queued(store, session)
+    assert store.finish_job(job, "done", result={"rows": 1}, file=data)
+    sha256 = store.jobs.get(session, job).file
+    assert sha256 == hashlib.sha256(data).hexdigest()
+    return job, store.directory.original(sha256)
+
+
+def test_a_job_s_file_goes_with_its_last_owner(store, session):
+    """Two jobs and a measurement that happen to hold the same bytes; then the session."""
+    measured = store.add_measurement(session, recording(b"rows"))
+    (first, file), (second, same) = made(store, session, b"rows"), made(store, session, b"rows")
+    assert file == same
+    store.delete_measurement(session, measured.id)
+    store.delete_job(session, first)
+    assert file.read_bytes() == b"rows"
+    store.delete_job(session, second)
+    assert not file.exists()
+    _, file = made(store, session, b"others")
+    store.delete_session(session)
+    assert not file.exists()
+
+
+def test_a_job_s_file_outlives_a_restart_and_one_that_came_too_late_is_not_kept(tmp_path):
+    store = Store(tmp_path, Limits())
+    session, _ = store.create_session(CAR, [])
+    _, kept = made(store, session, b"rows")
+    cancelled = queued(store, session)
+    store.jobs.finish(cancelled, "cancelled")
+    assert not store.finish_job(cancelled, "done", result={}, file=b"late")
+    store.close()
+    store = Store(tmp_path, Limits())
+    assert kept.read_bytes() == b"rows"
+    assert [file.name for file in store.directory.originals.glob("*/*")] == [kept.name]
+    store.close()
+
+
+def test_files_of_jobs_take_their_share_of_the_session(tmp_path):
+    store = Store(tmp_path, Limits(session_bytes=10))
+    session, _ = store.create_session(CAR, [])
+    job, _ = made(store, session, b"1234567")
+    store.require_room(session, 3)
+    with pytest.raises(Busy, match="measurements and sweeps would exceed 1e-05 MB together"):
+        store.require_room(session, 4)
+    with pytest.raises(Busy, match="delete one first"):
+        store.add_measurement(session, recording(b"1234"))
+    store.delete_job(session, job)
+    store.add_measurement(session, recording(b"1234"))
+    store.close()
 
 
 def test_a_restart_takes_running_jobs_back_and_counts_it_apart(store, session):
