@@ -4,8 +4,6 @@ The worker gets everything by value (vehicle, recordings, options), so it needs 
 database nor the data directory and may be another machine.
 """
 
-import hashlib
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -14,7 +12,7 @@ from ..engine.channels import Run
 from ..engine.parameters import PARAMETER_NAMES, parameter
 from .errors import OverBudget
 from .job_store import Job
-from .jobs import Kind
+from .jobs import Kind, digest
 from .recordings import Recordings, with_braking
 from .schemas import IdentificationRequest
 from .settings import Limits
@@ -45,7 +43,7 @@ def as_asked(request: IdentificationRequest) -> str:
             form[role] = sorted(parameter(name).name for name in form[role])
     for given in ("bounds", "start"):
         form[given] = sorted([parameter(name).name, value] for name, value in form[given].items())
-    return hashlib.sha256(json.dumps(form, sort_keys=True).encode()).hexdigest()
+    return digest(form)
 
 
 def filled_in(spec: Mapping[str, Any], problem: Any) -> dict[str, Any]:

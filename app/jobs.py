@@ -6,6 +6,8 @@ ended is run again from its `spec`. Progress is in memory, and in the database o
 
 import asyncio
 import contextlib
+import hashlib
+import json
 import logging
 import time
 from collections.abc import AsyncIterator, Callable, Mapping
@@ -24,6 +26,11 @@ log = logging.getLogger(__name__)
 GRACE = 2.0
 MOST_ATTEMPTS = 3
 SAVE_EVERY = 1.0
+
+
+def digest(form: Mapping[str, Any]) -> str:
+    """What stands for a request in the form of JSON."""
+    return hashlib.sha256(json.dumps(form, sort_keys=True).encode()).hexdigest()
 
 
 @dataclass(frozen=True)

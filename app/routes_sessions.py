@@ -6,8 +6,8 @@ from fastapi import APIRouter, Body, Request, Response
 
 from ..engine.vehicle_file import vehicle_from_json, vehicle_to_json
 from .access import COOKIE, SessionId, bearer, give_session, require_service_token
-from .identification_job import KIND
-from .routes_identifications import job_to_json
+from .job_routes import all_to_json
+from .routes_identifications import VIEW as IDENTIFICATION
 from .routes_measurements import measurement_to_json
 from .schemas import JsonObject
 from .services import Shared
@@ -35,7 +35,7 @@ def read(sid: SessionId, services: Shared) -> dict[str, Any]:
         "vehicle": session.vehicle,
         "baseline": session.baseline,
         "measurements": [measurement_to_json(kept) for kept in services.store.measurements(sid)],
-        "identifications": [job_to_json(job) for job in services.jobs.of_session(sid, KIND)],
+        "identifications": all_to_json(services, sid, IDENTIFICATION),
     }
 
 
