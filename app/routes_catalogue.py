@@ -101,7 +101,7 @@ def manoeuvres() -> list[dict[str, Any]]:
 def manoeuvre(key: str) -> dict[str, Any]:
     """One manoeuvre as data, to change and send back with a simulation."""
     from ..engine.manoeuvre import manoeuvre_to_json
-    from .simulate import known_manoeuvre
+    from .excitation import known_manoeuvre
 
     return manoeuvre_to_json(known_manoeuvre(key))
 

@@ -81,25 +81,31 @@ class PostsRequest(WireForm):
     measurement: Name
 
 
-class SimulationRequest(WireForm):
-    """One simulation of the session's car, or of another one.
+class ExcitationForm(WireForm):
+    """What a car goes through: a manoeuvre ("2" without), a recording's rims, or its posts.
 
-    road : in place of the manoeuvre's
+    road, duration : in place of the manoeuvre's
     lift_off, step, sample_step : with a manoeuvre or posts; 2.5 ms and 5 ms unless told
     """
 
-    vehicle: JsonObject | None = None
-    values: Annotated[dict[Name, FiniteFloat], Field(max_length=200)] = {}
     manoeuvre: KeyOrObject | None = None
     rims: RimsRequest | None = None
     posts: PostsRequest | None = None
     road: JsonObject | None = None
-    model: Literal["8dof", "7dof"] = "8dof"
+    duration: FiniteFloat | None = None
     lift_off: bool = False
     step: Annotated[FiniteFloat, Field(ge=SHORTEST_STEP, le=LONGEST_STEP)] | None = None
     sample_step: Annotated[FiniteFloat, Field(ge=SHORTEST_STEP, le=LONGEST_SAMPLE_STEP)] | None = (
         None
     )
+
+
+class SimulationRequest(ExcitationForm):
+    """One simulation of the session's car, or of another one."""
+
+    vehicle: JsonObject | None = None
+    values: Annotated[dict[Name, FiniteFloat], Field(max_length=200)] = {}
+    model: Literal["8dof", "7dof"] = "8dof"
     channels: Names | None = None
     max_samples: Annotated[int, Field(ge=2, le=2_000_000)] | None = None
     decimate: Literal["extremes", "stride"] = "extremes"

@@ -1,7 +1,7 @@
 """What every car of a sweep goes through: a road or a rig, or the rims of a recording."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,8 @@ from .car_rows import car_row
 from .channels import Run
 from .demand import Demand, PiecewiseLinear
 from .manoeuvre import Manoeuvre, manoeuvre_to_json
-from .rims import prepare
-from .rims_settings import RimsSettings
+from .recorded_motion import RecordedMotion
+from .rims import for_car
 from .road import Road
 from .simulation import (
     FREE_STEP,
@@ -82,21 +82,18 @@ class FreeExcitation:
 
 @dataclass(frozen=True, slots=True)
 class RimsExcitation:
-    """A car that follows the wheel centres and a_x of a recording; fields as of `simulate_rims`."""
+    """A car that follows the wheel centres and a_x of a recording."""
 
-    run: Run
+    motion: RecordedMotion
     traction: Traction = "exact"
-    settings: RimsSettings = field(default_factory=RimsSettings)
 
     def simulate(self, vehicle: Vehicle, model: Model = "8dof") -> Simulation:
         """One car through all of it; raises what the simulation raises."""
-        return simulate_rims(
-            vehicle, self.run, traction=self.traction, settings=self.settings, model=model
-        )
+        return simulate_rims(vehicle, self.motion, traction=self.traction, model=model)
 
     def longest_step(self, vehicle: Vehicle) -> float:
-        """The longest step that is taken, s; MeasurementError for a run that cannot drive a car."""
-        return prepare(self.run, vehicle, self.settings).step
+        """The longest step that is taken, s; MeasurementError for marks outside the run."""
+        return for_car(self.motion, vehicle).step
 
     def eigenvalues(self, vehicle: Vehicle) -> NDArray[np.complex128]:
         """Of a car on its rims at rest, 1/s."""
@@ -106,9 +103,9 @@ class RimsExcitation:
         """What it is, as plain JSON data; the recording by name."""
         return {
             "mode": "rims",
-            "recording": _recording(self.run),
+            "recording": _recording(self.motion.run),
             "traction": self.traction,
-            "settings": asdict(self.settings),
+            "settings": asdict(self.motion.settings),
         }
 
 

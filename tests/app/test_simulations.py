@@ -140,7 +140,18 @@ def test_a_road_of_ones_own_replaces_the_manoeuvres(driver):
     assert min(values) == 0.0
 
 
+def test_a_manoeuvre_lasts_as_long_as_asked(driver):
+    body = {"manoeuvre": "bump", "duration": 1.5, "channels": ["chassis.z"]}
+    assert driver.post("/simulations", json=body).json()["duration"] == pytest.approx(1.5)
+
+
 REFUSED = {
+    "no duration": ({"manoeuvre": "bump", "duration": 0}, 422, "A duration of 0 s is asked for"),
+    "duration of a recording": (
+        {"rims": {"measurement": "x"}, "duration": 2.0},
+        422,
+        "duration means nothing with rims",
+    ),
     "unknown manoeuvre": ({"manoeuvre": "3"}, 404, "constant-speed-c"),
     "two modes": ({"manoeuvre": "2", "rims": {"measurement": "x"}}, 422, "leave one"),
     "manoeuvre by number": ({"manoeuvre": 2}, 422, "manoeuvre is refused: give a known"),

@@ -1,0 +1,125 @@
+"""What drives a car, as requests for simulations and for sweeps name it.
+
+Imported with the first of them, because it brings numba and scipy.
+"""
+
+from dataclasses import replace
+from typing import Literal
+
+from ..engine.channels import Run
+from ..engine.excitation import Excitation, FreeExcitation, RimsExcitation
+from ..engine.manoeuvre import Manoeuvre, manoeuvre_from_json, reference_manoeuvres
+from ..engine.recorded_motion import RecordedMotion, recorded_motion
+from ..engine.road_specs import road_spec_from_json
+from ..engine.simulation import FREE_STEP, SAMPLE_STEP
+from .errors import InvalidRequest, NotFound
+from .recordings import Recordings, with_braking
+from .schemas import ExcitationForm
+from .store import Measurement, Store
+
+Mode = Literal["manoeuvre", "rims", "posts"]
+MODES: tuple[Mode, ...] = ("manoeuvre", "rims", "posts")
+
+DEFAULT_MANOEUVRE = "2"
+
+RECORDED = "the recording has its own; leave it out"
+MEANS_NOTHING: dict[Mode, dict[str, str]] = {
+    "manoeuvre": {},
+    "rims": {
+        "road": "the recording has its road in it; leave it out",
+        "duration": RECORDED,
+        "lift_off": "tyres play no part; leave it out",
+        "step": "give it as rims.settings.step",
+        "sample_step": "the result has the recording's own times; leave it out",
+    },
+    "posts": {"road": "a rig has none; leave it out", "duration": RECORDED},
+}
+"""By mode, what of a request would change nothing, and the remedy."""
+
+
+def mode_of(request: ExcitationForm) -> Mode:
+    """What a request lets the car go through; InvalidRequest for what means nothing with it."""
+    asked: list[Mode] = [name for name in MODES if getattr(request, name) is not None]
+    if len(asked) > 1:
+        raise InvalidRequest(f"The request has {' and '.join(asked)}; leave one of them.")
+    mode = asked[0] if asked else "manoeuvre"
+    for name, remedy in MEANS_NOTHING[mode].items():
+        if getattr(request, name) not in (None, False):
+            raise InvalidRequest(
+                f"The field {name} means nothing with {mode}: {remedy}.", field=name
+            )
+    return mode
+
+
+def recording_of(request: ExcitationForm, session: str, store: Store) -> Measurement | None:
+    """The measurement that moves the car, if one does."""
+    asked = request.rims or request.posts
+    return None if asked is None else store.measurement(session, asked.measurement)
+
+
+def manoeuvre_of(request: ExcitationForm) -> Manoeuvre:
+    """The manoeuvre that is asked for, for as long and on the road that are."""
+    asked = DEFAULT_MANOEUVRE if request.manoeuvre is None else request.manoeuvre
+    manoeuvre = known_manoeuvre(asked) if isinstance(asked, str) else manoeuvre_from_json(asked)
+    if request.duration is not None:
+        manoeuvre = manoeuvre.lasting(request.duration)
+    if request.road is None:
+        return manoeuvre
+    if manoeuvre.kind != "road":
+        raise InvalidRequest(
+            "A rig test has no road; leave out road or choose another manoeuvre.", field="road"
+        )
+    return replace(manoeuvre, road=road_spec_from_json(request.road))
+
+
+def known_manoeuvre(key: str) -> Manoeuvre:
+    """The manoeuvre that comes along under a key; NotFound lists the keys."""
+    try:
+        return reference_manoeuvres()[key]
+    except KeyError:
+        known = ", ".join(reference_manoeuvres())
+        raise NotFound(f"There is no manoeuvre by that key; there are {known}.") from None
+
+
+def recording_in(
+    request: ExcitationForm, kept: Measurement, recordings: Recordings
+) -> Run | RecordedMotion:
+    """The recording of a request from memory: the motion of the rims, or the run with the posts."""
+    if request.rims is None:
+        return recordings.run(kept)
+    return recordings.motion(kept, request.rims.settings.settings(), request.rims.braking)
+
+
+def excitation_of(request: ExcitationForm, recording: Run | RecordedMotion | None) -> Excitation:
+    """What the engine lets the car go through.
+
+    recording : of a request that has one
+    """
+    if request.rims is not None and recording is not None:
+        if isinstance(recording, Run):
+            run = with_braking(recording, request.rims.braking)
+            recording = recorded_motion(run, request.rims.settings.settings())
+        return RimsExcitation(recording, request.rims.traction)
+    assert not isinstance(recording, RecordedMotion)
+    step, sample_step = _steps(request)
+    motion = manoeuvre_of(request) if recording is None else recording
+    return FreeExcitation(motion, None, request.lift_off, step, sample_step)
+
+
+def extent(request: ExcitationForm, kept: Measurement | None) -> tuple[float, float]:
+    """How long a car is simulated, s, and in how many steps or samples, whichever are more."""
+    if kept is None:
+        duration = manoeuvre_of(request).duration
+        return duration, duration / min(_steps(request))
+    duration = kept.summary["duration"]
+    if request.rims is None:
+        return duration, duration / min(_steps(request))
+    return duration, max(kept.summary["samples"], duration / request.rims.settings.step)
+
+
+def _steps(request: ExcitationForm) -> tuple[float, float]:
+    """Step and sample step with what holds untold, s."""
+    return (
+        FREE_STEP if request.step is None else request.step,
+        SAMPLE_STEP if request.sample_step is None else request.sample_step,
+    )
