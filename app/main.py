@@ -18,10 +18,12 @@ from . import (
     routes_page,
     routes_sessions,
     routes_simulations,
+    routes_sweeps,
 )
 from .cluster import Cluster
 from .guard import Guard
-from .identification_job import KIND, identification
+from .identification_job import KIND as IDENTIFICATION
+from .identification_job import identification
 from .interactive import Interactive
 from .jobs import Jobs
 from .package_files import package_folder
@@ -30,6 +32,8 @@ from .recordings import Recordings
 from .services import Services, Viewers
 from .settings import Settings
 from .store import Store
+from .sweep_job import KIND as SWEEP
+from .sweep_job import sweep
 from .warmup import WarmUp, ready_to_simulate
 
 log = logging.getLogger(__name__)
@@ -74,6 +78,7 @@ def create_app(
         routes_simulations,
         routes_measurements,
         routes_identifications,
+        routes_sweeps,
         routes_page,
     ):
         app.include_router(part.router)
@@ -102,7 +107,7 @@ def _services(
         jobs=Jobs(
             store,
             Cluster(settings.cluster, store.directory.scratch),
-            {KIND: identification(store, recordings)},
+            {IDENTIFICATION: identification(store, recordings), SWEEP: sweep(store, recordings)},
             ready=warmup.wait,
         ),
         warmup=warmup,

@@ -1,4 +1,4 @@
-"""Sessions: one visitor's car, its baseline, measurements and identifications."""
+"""Sessions: one visitor's car, its baseline, measurements, identifications and sweeps."""
 
 from typing import Annotated, Any
 
@@ -9,6 +9,7 @@ from .access import COOKIE, SessionId, bearer, give_session, require_service_tok
 from .job_routes import all_to_json
 from .routes_identifications import VIEW as IDENTIFICATION
 from .routes_measurements import measurement_to_json
+from .routes_sweeps import VIEW as SWEEP
 from .schemas import JsonObject
 from .services import Shared
 from .strict_json import StrictRoute
@@ -28,7 +29,7 @@ def create(request: Request, response: Response) -> dict[str, str]:
 
 @router.get("/{sid}")
 def read(sid: SessionId, services: Shared) -> dict[str, Any]:
-    """Everything in the session, results of identifications apart."""
+    """Everything in the session, results of its jobs apart."""
     session = services.store.session(sid)
     return {
         "id": sid,
@@ -36,6 +37,7 @@ def read(sid: SessionId, services: Shared) -> dict[str, Any]:
         "baseline": session.baseline,
         "measurements": [measurement_to_json(kept) for kept in services.store.measurements(sid)],
         "identifications": all_to_json(services, sid, IDENTIFICATION),
+        "sweeps": all_to_json(services, sid, SWEEP),
     }
 
 

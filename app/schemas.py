@@ -11,9 +11,11 @@ from pydantic import (
     BaseModel,
     BeforeValidator,
     ConfigDict,
+    Discriminator,
     Field,
     FiniteFloat,
     StringConstraints,
+    Tag,
 )
 from pydantic_core import PydanticCustomError
 
@@ -111,6 +113,45 @@ class SimulationRequest(ExcitationForm):
     decimate: Literal["extremes", "stride"] = "extremes"
     seq: Annotated[int, Field(ge=0, le=2**53)] = 0
     scene: bool = False
+
+
+class SpacedForm(WireForm):
+    """Evenly spaced levels, both ends included."""
+
+    low: FiniteFloat
+    high: FiniteFloat
+    count: int
+
+
+Levels = Annotated[
+    Annotated[SpacedForm, Tag("spaced")]
+    | Annotated[list[FiniteFloat], Field(max_length=10_000), Tag("listed")],
+    Discriminator(lambda value: "listed" if isinstance(value, list) else "spaced"),
+]
+
+
+class FullFactorialForm(WireForm):
+    """Every combination of levels, given by parameter, SI."""
+
+    kind: Literal["full-factorial"]
+    levels: Annotated[dict[Name, Levels], Field(max_length=200)]
+
+
+class SampledForm(WireForm):
+    """Cars drawn from a box, (low, high) by parameter, SI."""
+
+    kind: Literal["sobol", "latin-hypercube"]
+    ranges: Annotated[dict[Name, tuple[FiniteFloat, FiniteFloat]], Field(max_length=200)]
+    cars: int
+    seed: Annotated[int, Field(ge=0, le=2**53)] = 0
+
+
+class SweepRequest(ExcitationForm):
+    """Let a design of cars, made from the session's (or another one), go through the same."""
+
+    vehicle: JsonObject | None = None
+    design: Annotated[FullFactorialForm | SampledForm, Field(discriminator="kind")]
+    key: Name | None = None
 
 
 class RoadPreview(WireForm):

@@ -1,0 +1,139 @@
+"""A sweep as a background job: what goes to the worker, what the worker does, what comes back.
+
+The worker gets everything by value and gives the rows back as a Parquet file, so it needs neither
+the database nor the data directory and may be another machine.
+"""
+
+import io
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from typing import Any
+
+from .errors import OverBudget
+from .job_store import Job
+from .jobs import Kind, digest
+from .recordings import Recordings
+from .schemas import FullFactorialForm, SweepRequest
+from .settings import Limits
+from .store import Measurement, Store
+from .worker import Report, WithFile
+
+KIND = "sweep"
+
+STATUS_BYTES = 100
+"""What a car's status takes in the file, at most."""
+
+
+def sweep(store: Store, recordings: Recordings) -> Kind:
+    """The job kind, bound to where its recordings are kept."""
+
+    def payload(job: Job) -> dict[str, Any]:
+        runs = [
+            recordings.run(store.measurement(job.session, run["id"])) for run in job.spec["runs"]
+        ]
+        return {**job.spec, "run": runs[0] if runs else None}
+
+    return Kind(task=sweep_cars, payload=payload)
+
+
+def as_asked(request: SweepRequest) -> str:
+    """What stands for a request: the same whenever it is sent, however it calls the parameters."""
+    form = request.model_dump(mode="json", exclude={"key", "design"})
+    return digest({**form, "design": design_of(request.design).to_json()})
+
+
+def design_of(form: Any) -> Any:
+    """The engine's design; raises what a person can mend."""
+    from ..engine.designs import FullFactorial, LatinHypercube, Sobol, Spaced
+
+    if isinstance(form, FullFactorialForm):
+        return FullFactorial(
+            {
+                name: given
+                if isinstance(given, list)
+                else Spaced(given.low, given.high, given.count)
+                for name, given in form.levels.items()
+            }
+        )
+    make = Sobol if form.kind == Sobol.kind else LatinHypercube
+    return make(form.ranges, form.cars, form.seed)
+
+
+def most_bytes(request: SweepRequest) -> int:
+    """How large the file can become."""
+    from ..engine.sweep import columns
+
+    design = design_of(request.design)
+    return design.cars * (8 * len(columns(design)) + STATUS_BYTES)
+
+
+def check_and_fill(
+    request: SweepRequest,
+    vehicle: Mapping[str, Any],
+    kept: Measurement | None,
+    recordings: Recordings,
+    limits: Limits,
+) -> dict[str, Any]:
+    """Everything that the job needs, checked, with what holds untold filled in."""
+    from ..engine.manoeuvre import manoeuvre_to_json
+    from ..engine.sweep_checks import check_sweep, threads_of
+    from ..engine.sweep_file import require_package
+    from ..engine.vehicle_file import vehicle_from_json, vehicle_to_json
+    from .excitation import excitation_of, extent, manoeuvre_of, mode_of
+
+    require_package("parquet")
+    mode = mode_of(request)
+    car, design = vehicle_from_json(vehicle), design_of(request.design)
+    _check_budget(design.cars, extent(request, kept)[1], limits)
+    run = None if kept is None else recordings.run(kept)
+    driven = excitation_of(request, run)
+    check_sweep(car, design, driven, threads_of(None))
+    spec = request.model_dump(mode="json", exclude={"key"})
+    spec |= {"vehicle": vehicle_to_json(car), "design": design.to_json()}
+    spec["runs"] = [] if kept is None else [{"id": kept.id, "name": kept.name}]
+    if mode != "rims":
+        spec |= {name: getattr(driven, name) for name in ("step", "sample_step")}
+    if mode == "manoeuvre":
+        spec |= {"manoeuvre": manoeuvre_to_json(manoeuvre_of(request)), "road": None}
+        spec["duration"] = spec["manoeuvre"]["duration"]
+    return spec
+
+
+def _check_budget(cars: int, steps: float, limits: Limits) -> None:
+    """Refuse more cars, or more steps of all cars together, than a sweep over REST takes."""
+    if cars > limits.swept_cars:
+        raise OverBudget(
+            f"{cars:.6g} cars are asked for, a sweep over REST takes at most {limits.swept_cars};"
+            " take fewer, or sweep with `ridetune sweep`."
+        )
+    if cars * steps > limits.swept_steps:
+        raise OverBudget(
+            f"{cars} cars of {steps:.0f} steps are asked for, a sweep over REST takes at most"
+            f" {limits.swept_steps:.3g} steps together; take fewer cars, a shorter manoeuvre or a"
+            " longer step, or sweep with `ridetune sweep`."
+        )
+
+
+def sweep_cars(payload: Any, report: Report, cancelled: Callable[[], bool]) -> WithFile:
+    """On the worker: sweep, reporting how many cars are done; the rows as Parquet."""
+    from ..engine.sweep import sweep as sweep_through
+    from ..engine.sweep_file import description, write_blocks
+    from ..engine.vehicle_file import vehicle_from_json
+    from .excitation import excitation_of
+
+    request = SweepRequest.model_validate(
+        {name: payload[name] for name in SweepRequest.model_fields if name in payload}
+    )
+    vehicle, design = vehicle_from_json(payload["vehicle"]), design_of(request.design)
+    driven = excitation_of(request, payload["run"])
+    reached: dict[str, Any] = {}
+
+    def progress(now: Any) -> None:
+        reached.update(asdict(now))
+        report(reached)
+
+    blocks = sweep_through(vehicle, design, driven, progress=progress, cancelled=cancelled)
+    described, stream = description(vehicle, design, driven), io.BytesIO()
+    write_blocks(stream, "parquet", described, blocks)
+    result = {name: reached[name] for name in ("cars", "failed", "seconds")}
+    return WithFile({**result, "columns": described["columns"]}, stream.getvalue())
