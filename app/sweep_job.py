@@ -5,6 +5,7 @@ the database nor the data directory and may be another machine.
 """
 
 import io
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from typing import Any
@@ -100,17 +101,22 @@ def check_and_fill(
 
 
 def _check_budget(cars: int, steps: float, limits: Limits) -> None:
-    """Refuse more cars, or more steps of all cars together, than a sweep over REST takes."""
+    """Refuse more cars, longer ones, or more steps of all together than a sweep over REST takes."""
     if cars > limits.swept_cars:
         raise OverBudget(
             f"{cars:.6g} cars are asked for, a sweep over REST takes at most {limits.swept_cars};"
-            " take fewer, or sweep with `ridetune sweep`."
+            " take fewer, or use the command ridetune sweep."
+        )
+    if steps > limits.simulated_steps:
+        raise OverBudget(
+            f"{math.ceil(steps)} steps a car are asked for, over REST one takes at most"
+            f" {limits.simulated_steps}; take a shorter manoeuvre or a longer step."
         )
     if cars * steps > limits.swept_steps:
         raise OverBudget(
             f"{cars} cars of {steps:.0f} steps are asked for, a sweep over REST takes at most"
             f" {limits.swept_steps:.3g} steps together; take fewer cars, a shorter manoeuvre or a"
-            " longer step, or sweep with `ridetune sweep`."
+            " longer step, or use the command ridetune sweep."
         )
 
 

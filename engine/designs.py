@@ -9,6 +9,7 @@ are drawn. Parameters go by their path or symbol; every number of a vehicle can 
 """
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
@@ -223,10 +224,11 @@ def _check_levels(name: str, levels: Spaced | Listed) -> None:
         return
     if not levels.values:
         raise SweepError(f"{name} has no levels; give at least one, or leave it out.")
-    for place, value in enumerate(levels.values):
+    for value in levels.values:
         _check_value(name, value, "levels")
-        if value in levels.values[:place]:
-            raise SweepError(f"{name} has the level {value:g} twice; give it once.")
+    value, times = Counter(levels.values).most_common(1)[0]
+    if times > 1:
+        raise SweepError(f"{name} has the level {value:g} more than once; give it once.")
 
 
 def _check_range(name: str, low: float, high: float, what: str) -> None:

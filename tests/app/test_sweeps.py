@@ -190,7 +190,8 @@ REFUSED = {
     "crossed bounds": ({"design": {**BOX, "ranges": {"K_F": [2e4, 1e4]}}}, "crossed"),
     "no parameter": ({"design": {**BOX, "ranges": {}}}, "varies nothing"),
     "too many cars": ({"design": {**BOX, "cars": 10**12}}, "at most 100000"),
-    "too many steps": ({"design": {**BOX, "cars": 100_000}, "step": 1e-5}, "steps together"),
+    "too many steps": ({"design": {**BOX, "cars": 100_000}, "step": 2e-5}, "steps together"),
+    "too long a car": ({"duration": 10, "step": 1e-5}, "1000000 steps a car are asked for"),
     "no cars": ({"design": {**BOX, "cars": 0}}, "cars is 0"),
     "unstable step": (
         {"design": {**BOX, "ranges": {"C_F": [1e3, 2e5]}}},

@@ -108,7 +108,7 @@ def test_a_box_that_cannot_be_swept_is_refused_in_one_sentence(ranges, told):
     [
         ({}, "varies nothing"),
         ({"K_F": []}, "has no levels"),
-        ({"K_F": [1e4, 2e4, 1e4]}, "has the level 10000 twice"),
+        ({"K_F": [1e4, 2e4, 1e4]}, "has the level 10000 more than once"),
         ({"K_F": [1e4, 1.0]}, "must lie between"),
         ({"K_F": Spaced(3e4, 1e4, 3)}, "crossed"),
         ({"K_F": Spaced(1e4, 3e4, 1)}, "levels is 1; give a whole number from 2 on"),
