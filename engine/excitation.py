@@ -20,6 +20,7 @@ from .simulation import (
     Model,
     Simulation,
     Traction,
+    posts_demand,
     simulate_posts,
     simulate_rims,
     simulate_road,
@@ -52,6 +53,12 @@ class FreeExcitation:
         if isinstance(self.motion, Run) or self.motion.kind == "posts":
             return simulate_posts(vehicle, self.motion, **how)
         return simulate_road(vehicle, self.motion, road=self.road, **how)
+
+    def demand(self, vehicle: Vehicle) -> Demand:
+        """What acts on a car from outside."""
+        if isinstance(self.motion, Run):
+            return posts_demand(self.motion)
+        return self.motion.demand(vehicle, self.road)
 
     def longest_step(self, vehicle: Vehicle) -> float:
         """The longest step that is taken, s; the same for every car.

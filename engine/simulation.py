@@ -118,7 +118,7 @@ def simulate_posts(
         are joined by a C2 spline and its first sample becomes t = 0
     """
     if isinstance(motion, Run):
-        demand = _posts_demand(motion)
+        demand = posts_demand(motion)
     elif motion.kind == "posts":
         demand = motion.demand(vehicle)
     else:
@@ -381,7 +381,7 @@ def _load_shares(run: Run) -> dict[str, float]:
     }
 
 
-def _posts_demand(run: Run) -> Demand:
+def posts_demand(run: Run) -> Demand:
     """Demand of a rig test from a run with the posts' heights."""
     names = [f"post.{corner}.z" for corner in CORNERS]
     missing = [name for name in names if name not in run]

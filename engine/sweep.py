@@ -1,8 +1,9 @@
 """Sweeps: every car of a design through the same excitation, its figures in one row.
 
 The cars are drawn, simulated and given out block by block, so memory does not grow with their
-number; histories are not kept. A car that cannot exist or leaves the model's range has no figures,
-but a status that says why, and the sweep goes on.
+number; histories are not kept. Cars that are driven alike go side by side (`side_by_side.py`). A
+car that cannot exist or leaves the model's range has no figures, but a status that says why, and
+the sweep goes on.
 """
 
 import time
@@ -17,7 +18,8 @@ from .errors import Cancelled, RideError
 from .excitation import Excitation
 from .figures import OK, figures, figures_of, reason
 from .parameters import PARAMETERS
-from .sweep_checks import check_sweep, threads_of
+from .side_by_side import SideBySide, side_by_side
+from .sweep_checks import check_sweep, threads_of, typical_cars
 from .vehicle import Vehicle, numbers
 
 Block = dict[str, NDArray]
@@ -100,7 +102,7 @@ def _blocks(
     cancelled: Callable[[], bool] | None,
 ) -> Iterator[Block]:
     began, done, failed = time.perf_counter(), 0, 0
-    part = FIRST_PART * threads
+    part, together = FIRST_PART * threads, side_by_side(excitation, typical_cars(vehicle, design))
     while done < design.cars:
         first, values = done, design.block(done, BLOCK)
         parts = []
@@ -109,7 +111,10 @@ def _blocks(
                 raise Cancelled(f"The sweep was cancelled after {done} of {design.cars} cars.")
             started = time.perf_counter()
             some = values[done - first : done - first + part]
-            parts.append(_rows(vehicle, design, some, excitation, threads))
+            if together is None:
+                parts.append(_one_by_one(vehicle, design, some, excitation, threads))
+            else:
+                parts.append(_together(vehicle, design, some, excitation, together, threads))
             done += len(some)
             failed += int(np.sum(parts[-1]["status"] != OK))
             taken = time.perf_counter() - started
@@ -123,10 +128,42 @@ def _blocks(
         }
 
 
-def _rows(
+def _together(
+    vehicle: Vehicle,
+    design: Design,
+    values: NDArray,
+    excitation: Excitation,
+    together: SideBySide,
+    threads: int,
+) -> Block:
+    """Figures and status of cars with some values (cars, parameters), in one batch."""
+    cars = together.rows(vehicle, design.names, values)
+    stable = together.stable(cars)
+    status = np.full(len(values), OK, dtype=object)
+    for k in np.flatnonzero(~stable):
+        status[k] = _refusal(vehicle, design, values[k], excitation)
+    rows: Block = {figure.name: np.full(len(values), np.nan) for figure in figures()}
+    if stable.any():
+        found, told = together.figures(cars[stable], threads)
+        for name, column in found.items():
+            rows[name][stable] = column
+        status[stable] = np.where(told == "", OK, told)
+    return rows | {"status": status}
+
+
+def _refusal(vehicle: Vehicle, design: Design, values: NDArray, excitation: Excitation) -> str:
+    """Why there is no such car, or why it does not take the step."""
+    try:
+        excitation.simulate(_car(vehicle, design, values))
+    except RideError as error:
+        return reason(error)
+    return OK
+
+
+def _one_by_one(
     vehicle: Vehicle, design: Design, values: NDArray, excitation: Excitation, threads: int
 ) -> Block:
-    """Figures and status of cars with some values (cars, parameters) of the parameters."""
+    """The same of cars that are not all driven alike."""
     status = np.full(len(values), OK, dtype=object)
     cars = []
     for k, row in enumerate(values):

@@ -61,6 +61,22 @@ def check_sweep(vehicle: Vehicle, design: Design, excitation: Excitation, thread
         )
 
 
+def typical_cars(vehicle: Vehicle, design: Design) -> list[Vehicle]:
+    """The car in the middle of the design's box, and those with one parameter at either end.
+
+    The vehicle itself stands for the middle where there is no such car.
+    """
+    middle = 0.5 * (design.low + design.high)
+    trials = [middle]
+    for k in range(middle.size):
+        trials += [
+            np.where(np.arange(middle.size) == k, end[k], middle)
+            for end in (design.low, design.high)
+        ]
+    first, *others = (_car_at(vehicle, design, values) for values in trials)
+    return [first or vehicle, *(car for car in others if car is not None)]
+
+
 def _run(car: Vehicle, excitation: Excitation) -> None:
     """Let one car go through it all, so that what is wrong with that is told at once."""
     with suppress(SimulationDiverged):

@@ -5,15 +5,18 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
+from ...engine.designs import Sobol
+from ...engine.excitation import FreeExcitation
 from ...engine.identification import Problem, identify
 from ...engine.manoeuvre import reference_manoeuvres
 from ...engine.measurement import read_run
-from ...engine.simulation import simulate_road
+from ...engine.simulation import FREE_STEP, simulate_road
+from ...engine.sweep import sweep
 from ...engine.vehicle_file import read_vehicle
 from ..package_files import package_folder
-from .modes import Mode, road_mode, some_cars, the_car, the_demand
+from .modes import STAGES, Mode, road_mode, some_cars, the_car, the_demand
 from .row import Row
-from .timing import one_core, ratio
+from .timing import Timing, one_core, ratio
 from .workbench import BATCH_SIZE, Workbench
 
 Case = Callable[[Workbench], Row]
@@ -26,6 +29,9 @@ LANES_JUDGED = 8
 
 FEW, MANY = 1_000, 10_000
 """Batches between which the time per car should not grow."""
+
+SWEPT, SWEEP_SECONDS = 100_000, 2.0
+"""Cars of the sweep, and how long each drives, s."""
 
 START = {"front.suspension.stiffness": 30000.0, "rear.pivot.angle": 0.3}
 """Where the identification begins, as in sample_runs/README.md."""
@@ -130,6 +136,24 @@ def identification(bench: Workbench) -> Row:
     return Row(what, timing)
 
 
+def sweep_of_cars(bench: Workbench) -> Row:
+    """A sweep as the command runs it but for its file, by the clock: every figure of every car."""
+    bump = reference_manoeuvres()["bump"].lasting(SWEEP_SECONDS)
+    ranges = {
+        "front.suspension.stiffness": (15e3, 40e3),
+        "front.suspension.damping": (800.0, 3000.0),
+        "rear.pivot.distance": (0.8, 2.0),
+    }
+    cars = SWEPT if bench.pace.fewest > 1 else SWEPT // 10
+    began = time.perf_counter()
+    for _ in sweep(the_car(), Sobol(ranges, cars), FreeExcitation(bump)):
+        pass
+    timing = Timing((time.perf_counter() - began,))
+    what = f"a sweep of {cars} cars over a bump, figures of all, on all cores (once)"
+    evaluations = STAGES * round(SWEEP_SECONDS / FREE_STEP)
+    return Row(what, timing, cars, SWEEP_SECONDS, evaluations)
+
+
 CASES: Mapping[str, Case] = {
     "road-one": one_car(lambda bench: bench.road),
     "road-channels": every_channel,
@@ -142,5 +166,6 @@ CASES: Mapping[str, Case] = {
     "rims-batch": batch(lambda bench: bench.rims),
     "rims-jacobian": jacobian,
     "identification": identification,
+    "sweep": sweep_of_cars,
 }
 """Rows by name, in the order of the table."""

@@ -8,6 +8,7 @@ from typing import Any, Literal
 from ...engine.errors import SimulationError
 from ...engine.excitation import Excitation, FreeExcitation, RimsExcitation
 from ...engine.measurement import read_run
+from ...engine.recorded_motion import recorded_motion
 from ...engine.road_file import read_road
 from ...engine.road_specs import IsoRoad
 from ...engine.simulation import FREE_STEP
@@ -52,7 +53,8 @@ def excitation(options: Namespace, mode: Mode) -> Excitation:
     """What the options let the car go through."""
     if mode == "rims":
         [run] = read_runs([options.rims], options.braking or ())
-        return RimsExcitation(run, options.traction or "exact", rims_settings(options))
+        motion = recorded_motion(run, rims_settings(options))
+        return RimsExcitation(motion, options.traction or "exact")
     how: dict[str, Any] = {
         "lift_off": options.lift_off,
         "step": FREE_STEP if options.step is None else options.step,

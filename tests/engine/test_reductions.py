@@ -4,12 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
 from ridetune.engine.car_rows import car_row, car_rows
 from ridetune.engine.integration import free_states, free_tallies, rims_states, rims_tallies
-from ridetune.engine.kernels.histogram import BINS, LOAD_FROM, LOAD_TO, TRAVEL_FROM, TRAVEL_TO
 from ridetune.engine.manoeuvre import reference_manoeuvres
-from ridetune.engine.metrics import metrics
 from ridetune.engine.output_channels import DEFAULT_POINTS
 from ridetune.engine.reductions import figures, reduction
 from ridetune.engine.rims import prepare
@@ -23,41 +20,14 @@ from ridetune.engine.simulation import (
 from ridetune.engine.stepping import prepare_free
 
 from ..factories import paper_vehicle, random_vehicle
+from ..tallied import assert_figures
 
 [(POINT, POSITION)] = DEFAULT_POINTS.items()
-
-WEIGHTING_ERROR = 5e-4
-"""Of a parabola through instants h = 1.25 ms apart, (w h)^3 / 12 at the wheels' 15 Hz, and of the
-spectrum of 5 ms samples, into which falls what lies above 100 Hz."""
-
-NO_MOTION = 1e-12
-"""m/s2, m, rad: what is left of a motion that symmetry forbids."""
 
 
 def cars_of(count):
     rng = np.random.default_rng(12)
     return [paper_vehicle(), *(random_vehicle(rng, braked=True) for _ in range(count - 1))]
-
-
-def compare(found, run, vehicle):
-    """Each figure beside that of the history; percentiles lie in the same bin or the next."""
-    expected = {metric.name: metric.value for metric in metrics(run)}
-    assert list(found) == list(expected)
-    for name, value in expected.items():
-        axle = vehicle.front if ".front." in name else vehicle.rear
-        if name.endswith((".p01", ".p99")) and "travel" in name:
-            width = axle.suspension.mount_height * (TRAVEL_TO - TRAVEL_FROM) / BINS
-            assert_allclose(found[name], value, rtol=0, atol=2.0 * width, err_msg=name)
-        elif name.endswith((".p01", ".p99")):
-            width = np.mean(run[name[:4] + "." + name[5] + "l.load"][:1]) * (LOAD_TO - LOAD_FROM)
-            assert_allclose(found[name], value, rtol=0, atol=2.0 * width / BINS, err_msg=name)
-        elif ".a_" in name:
-            assert_allclose(found[name], value, rtol=WEIGHTING_ERROR, atol=NO_MOTION, err_msg=name)
-        elif name.endswith("coefficient"):
-            # Over the mean of the samples there, over the mean in time here: the ends weigh half.
-            assert_allclose(found[name], value, rtol=2.0 / run.time.size, err_msg=name)
-        else:
-            assert_allclose(found[name], value, rtol=1e-9, atol=NO_MOTION, err_msg=name)
 
 
 @pytest.mark.parametrize("manoeuvre", ["2", "brake", "bump", "heave"])
@@ -70,7 +40,7 @@ def test_tallied_figures_are_those_of_each_car_s_history(manoeuvre):
     inputs = prepare_free(driven.demand(vehicle), FREE_STEP, SAMPLE_STEP)
     reduced = reduction(run, inputs.steps, POINT, POSITION)
     found = figures(free_tallies(car_row(vehicle)[np.newaxis], inputs, reduced).values, reduced)
-    compare({name: values[0] for name, values in found.items()}, run, vehicle)
+    assert_figures({name: values[0] for name, values in found.items()}, run, vehicle)
 
 
 def test_tallied_figures_on_rims_are_those_of_the_history():
@@ -83,7 +53,7 @@ def test_tallied_figures_on_rims_are_those_of_the_history():
     reduced = reduction(run, np.diff(inputs.node_time), POINT, POSITION)
     tallies = rims_tallies(car_row(other)[np.newaxis], inputs, True, reduced)
     found = figures(tallies.values, reduced)
-    compare({name: values[0] for name, values in found.items()}, run, other)
+    assert_figures({name: values[0] for name, values in found.items()}, run, other)
 
 
 @pytest.fixture(scope="module")
