@@ -1,7 +1,6 @@
 """What a sweep is refused for before its first car runs."""
 
 import itertools
-import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -13,6 +12,7 @@ from .designs import Design
 from .equilibrium import static_loads
 from .errors import SimulationDiverged, SweepError, VehicleError
 from .excitation import Excitation
+from .integration import cores
 from .stability import is_stable, largest_stable_step, too_long
 from .vehicle import Vehicle
 
@@ -27,13 +27,13 @@ MOST_CORNERED = 8
 
 def threads_of(asked: int | None) -> int:
     """The threads to work with: what is asked for, else one a core; SweepError beyond the cores."""
-    cores = len(os.sched_getaffinity(0))
+    most = cores()
     if asked is None:
-        return cores
-    if not 1 <= asked <= cores:
+        return most
+    if not 1 <= asked <= most:
         raise SweepError(
-            f"{asked} threads are asked for, but ridetune has {cores}"
-            f" {'core' if cores == 1 else 'cores'} here; take 1 to {cores}."
+            f"{asked} threads are asked for, but ridetune has {most}"
+            f" {'core' if most == 1 else 'cores'} here; take 1 to {most}."
         )
     return asked
 

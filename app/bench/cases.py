@@ -1,6 +1,5 @@
 """The engine's own rows."""
 
-import os
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -8,6 +7,7 @@ from dataclasses import replace
 from ...engine.designs import Sobol
 from ...engine.excitation import FreeExcitation
 from ...engine.identification import Problem, identify
+from ...engine.integration import cores
 from ...engine.manoeuvre import reference_manoeuvres
 from ...engine.measurement import read_run
 from ...engine.simulation import FREE_STEP, simulate_road
@@ -106,8 +106,9 @@ def all_cores(bench: Workbench) -> Row:
     together, single = bench.pace.alternate(
         lambda: mode.states(cars), alone, clock=time.perf_counter
     )
-    cores = len(os.sched_getaffinity(0))
-    what = f"{BATCH_SIZE} cars on {cores} cores: {ratio(single, together):.2f} times as fast as one"
+    what = (
+        f"{BATCH_SIZE} cars on {cores()} cores: {ratio(single, together):.2f} times as fast as one"
+    )
     return Row(what, together, BATCH_SIZE, mode.seconds, mode.evaluations)
 
 

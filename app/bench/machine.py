@@ -1,11 +1,12 @@
 """What the figures were measured on."""
 
-import os
 import platform
 import re
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
+
+from ...engine.integration import cores
 
 EXTENSIONS = ("sse4_2", "avx", "avx2", "fma", "avx512f", "neon", "asimd", "sve")
 """Vector instructions that matter, as Linux calls them."""
@@ -22,7 +23,7 @@ def describe() -> dict[str, Any]:
     return {
         "processor": processor_name(text),
         "extensions": extensions(text),
-        "cores": len(os.sched_getaffinity(0)),
+        "cores": cores(),
         "system": f"{platform.system()} {platform.machine()}",
         "versions": {"python": platform.python_version(), **_versions()},
     }
