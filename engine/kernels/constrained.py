@@ -54,8 +54,6 @@ class RimCorner(NamedTuple):
     """s D"""
     moment: float
     """S without the bar"""
-    reach: float
-    """Positive while the wheel centre can reach its prescribed height."""
     travel: float
     clearance: float
     """Of the spring-damper's mount."""
@@ -78,19 +76,24 @@ class Linear(NamedTuple):
     constant: float
 
 
-class RimAccelerations(NamedTuple):
-    """Second derivatives of all coordinates, the traction and the four vertical forces."""
+class RimRest(NamedTuple):
+    """What else is wanted of a corner: e, and what is tallied of its wheel."""
 
-    chassis: Quad
-    traction: float
-    fl: float
-    fr: float
-    rl: float
-    rr: float
-    fl_load: float
-    fr_load: float
-    rl_load: float
-    rr_load: float
+    resistance: float
+    travel: float
+    least: float
+    """Least of the arm's reach and the mount's clearance."""
+
+
+class RimShare(NamedTuple):
+    """What a corner adds to the chassis's equations z, pitch, roll and x, and its load."""
+
+    z: Linear
+    pitch: Linear
+    roll: Linear
+    x: Linear
+    load: Linear
+    rest: RimRest
 
 
 @inlined
@@ -141,12 +144,11 @@ def free_rise(chassis, arm, wheel):
 
 
 @inlined
-def rim_corner(corner, chassis, z, z_rate, rim, direction, braking):
-    """Geometry, inertia and unit-force effects of one corner on its rim.
+def rim_corner(corner, chassis, arm, z, z_rate, rim, direction, braking):
+    """Inertia and unit-force effects of one corner on its rim, its arm known.
 
     direction : tanh(v/v0); braking : weight b between driving (0) and braking (1)
     """
-    arm, reach = reached_arm(corner, chassis, z, z_rate, rim)
     wheel = wheel_motion(corner, chassis, arm, z, 0.0, z_rate)
     lever = rise_per_angle(chassis, wheel.arm)
     up_pitch, up_roll = -wheel.ahead, about_roll_axis(wheel.centre, chassis.e_Z)
@@ -172,7 +174,6 @@ def rim_corner(corner, chassis, z, z_rate, rim, direction, braking):
         Quad(share, 0.0, share * back_pitch, share * back_roll),
         share * back_arm + torque,
         element.moment,
-        reach,
         element.travel,
         element.clearance,
     )
@@ -220,8 +221,8 @@ def linear_add(a, b):
 
 
 @inlined
-def corner_rows(corner, moment):
-    """Shares of one corner in the chassis's equations z, pitch, roll and x, and its load."""
+def rim_share(corner, moment, reach):
+    """Share of a corner; moment : S with the bar, N m; reach : as of `reached_arm`."""
     equation, bend, load = corner.equation, corner.bend, wheel_load(corner, moment)
     mass, bias, m = equation.chassis_mass, equation.chassis_bias, equation.coupling
     force, pull = corner.force, corner.traction
@@ -229,12 +230,13 @@ def corner_rows(corner, moment):
     in_pitch = Quad(mass.xp, mass.zp, mass.pp, mass.pr)
     in_roll = Quad(mass.xr, mass.zr, mass.pr, mass.rr)
     in_x = Quad(mass.xx, mass.xz, mass.xp, mass.xr)
-    return (
+    return RimShare(
         row(in_z, bias.z, m.z, force.z, pull.z, bend, load),
         row(in_pitch, bias.pitch, m.pitch, force.pitch, pull.pitch, bend, load),
         row(in_roll, bias.roll, m.roll, force.roll, pull.roll, bend, load),
         row(in_x, bias.x, m.x, force.x, pull.x, bend, load),
         load,
+        RimRest(corner.resistance, corner.travel, min(reach, corner.clearance)),
     )
 
 
@@ -332,56 +334,41 @@ def rim_bar_torque(stiffness, damping, left, right):
 
 
 @inlined
-def rim_accelerations(body, chassis, fl, fr, rl, rr, a_x, exact):
-    """All second derivatives, the traction and the vertical forces.
+def rim_bar_torques(body, fl, fr, rl, rr):
+    """Torques of both bars from the arms' poses."""
+    return (
+        rim_bar_torque(body.front_bar_stiffness, body.front_bar_damping, fl, fr),
+        rim_bar_torque(body.rear_bar_stiffness, body.rear_bar_damping, rl, rr),
+    )
+
+
+@inlined
+def linear_sum(fl, fr, rl, rr, chassis):
+    """Sum over the corners and the sprung mass."""
+    return linear_add(chassis, linear_add(linear_add(fl, fr), linear_add(rl, rr)))
+
+
+@inlined
+def rims_solution(body, chassis, fl, fr, rl, rr, a_x, exact):
+    """c'' and F from the shares of the four corners.
 
     a_x : prescribed chassis acceleration, m/s2; exact : 1.0 to follow it exactly, 0.0 for the
-    paper's traction
+    paper's F = M a_x + sum e_i N_i
     """
-    front = rim_bar_torque(body.front_bar_stiffness, body.front_bar_damping, fl.arm, fr.arm)
-    rear = rim_bar_torque(body.rear_bar_stiffness, body.rear_bar_damping, rl.arm, rr.arm)
-    fl_z, fl_p, fl_r, fl_x, fl_load = corner_rows(fl, fl.moment - front)
-    fr_z, fr_p, fr_r, fr_x, fr_load = corner_rows(fr, fr.moment + front)
-    rl_z, rl_p, rl_r, rl_x, rl_load = corner_rows(rl, rl.moment - rear)
-    rr_z, rr_p, rr_r, rr_x, rr_load = corner_rows(rr, rr.moment + rear)
-
     mass, bias = sprung_mass(body, chassis)
     own_z = Linear(Quad(mass.xz, mass.zz, mass.zp, mass.zr), 0.0, bias.z)
-    own_p = Linear(Quad(mass.xp, mass.zp, mass.pp, mass.pr), 0.0, bias.pitch)
-    own_r = Linear(Quad(mass.xr, mass.zr, mass.pr, mass.rr), 0.0, bias.roll)
+    own_pitch = Linear(Quad(mass.xp, mass.zp, mass.pp, mass.pr), 0.0, bias.pitch)
+    own_roll = Linear(Quad(mass.xr, mass.zr, mass.pr, mass.rr), 0.0, bias.roll)
     own_x = Linear(Quad(mass.xx, mass.xz, mass.xp, mass.xr), 0.0, bias.x)
-    z = linear_add(own_z, linear_add(linear_add(fl_z, fr_z), linear_add(rl_z, rr_z)))
-    pitch = linear_add(own_p, linear_add(linear_add(fl_p, fr_p), linear_add(rl_p, rr_p)))
-    roll = linear_add(own_r, linear_add(linear_add(fl_r, fr_r), linear_add(rl_r, rr_r)))
-    x = linear_add(own_x, linear_add(linear_add(fl_x, fr_x), linear_add(rl_x, rr_x)))
-
-    none = Quad(0.0, 0.0, 0.0, 0.0)
-    resistance = linear_add(
-        linear_add(
-            eliminated(Linear(none, 0.0, 0.0), fl_load, fl.resistance),
-            eliminated(Linear(none, 0.0, 0.0), fr_load, fr.resistance),
-        ),
-        linear_add(
-            eliminated(Linear(none, 0.0, 0.0), rl_load, rl.resistance),
-            eliminated(Linear(none, 0.0, 0.0), rr_load, rr.resistance),
-        ),
-    )
+    z = linear_sum(fl.z, fr.z, rl.z, rr.z, own_z)
+    pitch = linear_sum(fl.pitch, fr.pitch, rl.pitch, rr.pitch, own_pitch)
+    roll = linear_sum(fl.roll, fr.roll, rl.roll, rr.roll, own_roll)
+    x = linear_sum(fl.x, fr.x, rl.x, rr.x, own_x)
     paper = 1.0 - exact
-    closing = eliminated(
-        Linear(Quad(exact, 0.0, 0.0, 0.0), paper, -(exact + paper * body.total_mass) * a_x),
-        resistance,
-        -paper,
-    )
-    acceleration, traction = solve(z, pitch, roll, x, closing)
-    return RimAccelerations(
-        acceleration,
-        traction,
-        bent(fl.bend, acceleration),
-        bent(fr.bend, acceleration),
-        bent(rl.bend, acceleration),
-        bent(rr.bend, acceleration),
-        value(fl_load, acceleration, traction),
-        value(fr_load, acceleration, traction),
-        value(rl_load, acceleration, traction),
-        value(rr_load, acceleration, traction),
-    )
+    known = -(exact + paper * body.total_mass) * a_x
+    closing = Linear(Quad(exact, 0.0, 0.0, 0.0), paper, known)
+    closing = eliminated(closing, fl.load, -paper * fl.rest.resistance)
+    closing = eliminated(closing, fr.load, -paper * fr.rest.resistance)
+    closing = eliminated(closing, rl.load, -paper * rl.rest.resistance)
+    closing = eliminated(closing, rr.load, -paper * rr.rest.resistance)
+    return solve(z, pitch, roll, x, closing)

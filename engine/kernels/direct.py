@@ -9,6 +9,7 @@ from typing import NamedTuple
 from ..jit import inlined
 from .equations import (
     ArmEquation,
+    ChassisMass,
     Quad,
     arm_equation,
     mass_add,
@@ -39,14 +40,23 @@ class FreeCorner(NamedTuple):
     """Of the spring-damper's mount."""
 
 
-class Accelerations(NamedTuple):
-    """Second derivatives of the eight coordinates."""
+class ArmRest(NamedTuple):
+    """What is left of a corner: M and Q - h of its arm, and what is tallied of its wheel."""
 
-    chassis: Quad
-    fl: float
-    fr: float
-    rl: float
-    rr: float
+    inertia: float
+    moment: float
+    load: float
+    travel: float
+    clearance: float
+
+
+class FreeShare(NamedTuple):
+    """What a corner adds to the chassis's equations, and its arm's own."""
+
+    mass: ChassisMass
+    force: Quad
+    coupling: Quad
+    rest: ArmRest
 
 
 @inlined
@@ -73,17 +83,36 @@ def free_corner(corner, chassis: Attitude, state, arm, given, direction):
 
 
 @inlined
-def condensed(corner, moment):
+def free_share(corner, moment):
     """What a corner adds to the chassis's equations once its arm is eliminated.
 
     Mass M_cc - m m^T / M and force Q_c - h_c - m (Q - h) / M.
+    moment : Q with the bar, N m
     """
     equation = corner.equation
     m = equation.coupling
     mass = mass_add(equation.chassis_mass, outer_product(-1.0 / equation.inertia, m, m))
     carried = quad_scale((equation.bias - moment) / equation.inertia, m)
     given = quad_add(corner.on_chassis, quad_scale(-1.0, equation.chassis_bias))
-    return mass, quad_add(given, carried)
+    rest = ArmRest(
+        equation.inertia, moment - equation.bias, corner.load, corner.travel, corner.clearance
+    )
+    return FreeShare(mass, quad_add(given, carried), m, rest)
+
+
+@inlined
+def arm_acceleration(share, chassis_acceleration):
+    """a'' = (Q - h - m . c'') / M of one arm once the chassis is known."""
+    return (share.rest.moment - quad_dot(share.coupling, chassis_acceleration)) / share.rest.inertia
+
+
+@inlined
+def chassis_acceleration(body, chassis, fl, fr, rl, rr):
+    """c'' from the shares of the four corners."""
+    mass, bias = sprung_mass(body, chassis)
+    arms = mass_add(mass_add(fl.mass, fr.mass), mass_add(rl.mass, rr.mass))
+    forces = quad_add(quad_add(fl.force, fr.force), quad_add(rl.force, rr.force))
+    return solve_chassis(mass_add(mass, arms), quad_add(forces, quad_scale(-1.0, bias)))
 
 
 @inlined
@@ -110,42 +139,15 @@ def solve_chassis(mass, force):
 
 
 @inlined
-def arm_acceleration(corner, moment, chassis_acceleration):
-    """a'' = (Q - h - m . c'') / M of one arm once the chassis is known."""
-    equation = corner.equation
-    remaining = moment - equation.bias - quad_dot(equation.coupling, chassis_acceleration)
-    return remaining / equation.inertia
-
-
-@inlined
-def bar_torques(body, fl, fr, rl, rr):
-    """Torques of both bars from the arms' poses."""
+def bar_torques(body, state):
+    """Torques of both bars in a state."""
     front_stiffness, front_damping = body.front_bar_stiffness, body.front_bar_damping
     rear_stiffness, rear_damping = body.rear_bar_stiffness, body.rear_bar_damping
     return (
-        bar_torque(front_stiffness, front_damping, fl.angle - fr.angle, fl.rate - fr.rate),
-        bar_torque(rear_stiffness, rear_damping, rl.angle - rr.angle, rl.rate - rr.rate),
-    )
-
-
-@inlined
-def accelerations(body, chassis, fl, fr, rl, rr):
-    """Second derivatives of all coordinates from the four corners' forces and inertias."""
-    front, rear = bar_torques(body, fl.arm, fr.arm, rl.arm, rr.arm)
-    fl_moment, fr_moment = fl.moment - front, fr.moment + front
-    rl_moment, rr_moment = rl.moment - rear, rr.moment + rear
-    mass, bias = sprung_mass(body, chassis)
-    fl_mass, fl_force = condensed(fl, fl_moment)
-    fr_mass, fr_force = condensed(fr, fr_moment)
-    rl_mass, rl_force = condensed(rl, rl_moment)
-    rr_mass, rr_force = condensed(rr, rr_moment)
-    mass = mass_add(mass, mass_add(mass_add(fl_mass, fr_mass), mass_add(rl_mass, rr_mass)))
-    arms = quad_add(quad_add(fl_force, fr_force), quad_add(rl_force, rr_force))
-    acceleration = solve_chassis(mass, quad_add(arms, quad_scale(-1.0, bias)))
-    return Accelerations(
-        acceleration,
-        arm_acceleration(fl, fl_moment, acceleration),
-        arm_acceleration(fr, fr_moment, acceleration),
-        arm_acceleration(rl, rl_moment, acceleration),
-        arm_acceleration(rr, rr_moment, acceleration),
+        bar_torque(
+            front_stiffness, front_damping, state.fl - state.fr, state.fl_rate - state.fr_rate
+        ),
+        bar_torque(
+            rear_stiffness, rear_damping, state.rl - state.rr, state.rl_rate - state.rr_rate
+        ),
     )

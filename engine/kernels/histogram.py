@@ -54,7 +54,7 @@ def percentile(counts, quantity, lane, share, begin, end):
 def percentiles(buffer, LANES, lane, counts, shares, out):
     """Percentiles of one car; out (QUANTITIES * P,), SI."""
     for axle in range(2):
-        car = corner_of(buffer, 2 * axle, LANES, lane)
+        car = corner_of(buffer, 4 * LANES, 2 * axle * LANES + lane)
         for p in range(shares.shape[0]):
             travel = percentile(counts, axle, lane, shares[p], TRAVEL_FROM, TRAVEL_TO)
             load = percentile(counts, 2 + axle, lane, shares[p], LOAD_FROM, LOAD_TO)

@@ -8,31 +8,10 @@ kept at the samples, or tallied there, or both.
 import numpy as np
 
 from ..jit import compiled, inlined
-from .buffer import (
-    CAR,
-    CAR_ROWS,
-    NOW,
-    REACH,
-    SLOPE,
-    STAGE,
-    STATES,
-    SUM,
-    body_of,
-    corner_of,
-    given_to,
-    keep_slope,
-    keep_turn,
-    keep_wheels,
-    stage_state,
-    turn_of,
-)
-from .constrained import rim_accelerations, rim_corner
-from .contact import find_contacts, read_road
-from .direct import accelerations, free_corner
-from .forces import direction_of_travel
+from .buffer import NOW, REACH, SLOPE, STAGE, STATES, SUM, take_car
+from .free import free_slopes
 from .histogram import BINS, QUANTITIES, percentiles
-from .kinematics import arm_pose, attitude, turn_by
-from .records import RimInput, State
+from .on_rims import rim_slopes
 from .tally import TALLY_END, TALLY_ROWS, clear_tally, keep_tally, tally
 from .weighing import set_filters, watch_point, weigh
 
@@ -43,124 +22,12 @@ _HEIGHT_LIMIT = 10.0
 
 
 @inlined
-def slope_of(state, c, fl, fr, rl, rr):
-    """Time derivative of a state with the given accelerations."""
-    return State(
-        state.x_rate,
-        state.z_rate,
-        state.pitch_rate,
-        state.roll_rate,
-        state.fl_rate,
-        state.fr_rate,
-        state.rl_rate,
-        state.rr_rate,
-        c.x,
-        c.z,
-        c.pitch,
-        c.roll,
-        fl,
-        fr,
-        rl,
-        rr,
-    )
-
-
-@inlined
-def free_car(buffer, LANES, j):
-    """Attitude, corners and accelerations of a lane's free car at the stage, its contacts found."""
-    state = stage_state(buffer, LANES, j)
-    pitch, roll = turn_of(buffer, 0, LANES, j), turn_of(buffer, 1, LANES, j)
-    chassis = attitude(pitch, roll, state.pitch_rate, state.roll_rate)
-    way = direction_of_travel(state.x_rate)
-    arm = arm_pose(state.fl, turn_of(buffer, 2, LANES, j), state.fl_rate)
-    corner, given = corner_of(buffer, 0, LANES, j), given_to(buffer, 0, LANES, j)
-    fl = free_corner(corner, chassis, state, arm, given, way)
-    arm = arm_pose(state.fr, turn_of(buffer, 3, LANES, j), state.fr_rate)
-    corner, given = corner_of(buffer, 1, LANES, j), given_to(buffer, 1, LANES, j)
-    fr = free_corner(corner, chassis, state, arm, given, way)
-    arm = arm_pose(state.rl, turn_of(buffer, 4, LANES, j), state.rl_rate)
-    corner, given = corner_of(buffer, 2, LANES, j), given_to(buffer, 2, LANES, j)
-    rl = free_corner(corner, chassis, state, arm, given, way)
-    arm = arm_pose(state.rr, turn_of(buffer, 5, LANES, j), state.rr_rate)
-    corner, given = corner_of(buffer, 3, LANES, j), given_to(buffer, 3, LANES, j)
-    rr = free_corner(corner, chassis, state, arm, given, way)
-    a = accelerations(body_of(buffer, LANES, j), chassis, fl, fr, rl, rr)
-    return chassis, fl, fr, rl, rr, a
-
-
-@inlined
-def rims_at(u):
-    """Prescribed motions of the four wheel centres in a row of stage inputs."""
-    fl, fr = RimInput(u[0], u[4], u[8]), RimInput(u[1], u[5], u[9])
-    rl, rr = RimInput(u[2], u[6], u[10]), RimInput(u[3], u[7], u[11])
-    return fl, fr, rl, rr
-
-
-@inlined
-def car_on_rims(buffer, LANES, j, rims, a_x, way, b, exact):
-    """Attitude, corners and accelerations of a lane's car on its rims at the stage."""
-    state = stage_state(buffer, LANES, j)
-    pitch, roll = turn_by(state.pitch), turn_by(state.roll)
-    keep_turn(buffer, 0, LANES, j, pitch)
-    keep_turn(buffer, 1, LANES, j, roll)
-    chassis = attitude(pitch, roll, state.pitch_rate, state.roll_rate)
-    z, z_rate = state.z, state.z_rate
-    fl = rim_corner(corner_of(buffer, 0, LANES, j), chassis, z, z_rate, rims[0], way, b)
-    fr = rim_corner(corner_of(buffer, 1, LANES, j), chassis, z, z_rate, rims[1], way, b)
-    rl = rim_corner(corner_of(buffer, 2, LANES, j), chassis, z, z_rate, rims[2], way, b)
-    rr = rim_corner(corner_of(buffer, 3, LANES, j), chassis, z, z_rate, rims[3], way, b)
-    a = rim_accelerations(body_of(buffer, LANES, j), chassis, fl, fr, rl, rr, a_x, exact)
-    return chassis, fl, fr, rl, rr, a
-
-
-@inlined
-def _free_slopes(buffer, LANES, given, driven):
-    """Derivative of every lane's stage state, free car.
-
-    given (16,) : row of stage inputs; driven : road, its start and spacing
-    """
-    road, start, spacing = driven
-    find_contacts(buffer, LANES)
-    read_road(buffer, LANES, given, road, start, spacing)
-    for j in range(LANES):
-        _, fl, fr, rl, rr, a = free_car(buffer, LANES, j)
-        clearance = min(min(fl.clearance, fr.clearance), min(rl.clearance, rr.clearance))
-        buffer[REACH * LANES + j] = min(buffer[REACH * LANES + j], clearance)
-        travels = (fl.travel, fr.travel, rl.travel, rr.travel)
-        keep_wheels(buffer, LANES, j, travels, (fl.load, fr.load, rl.load, rr.load))
-        slope = slope_of(stage_state(buffer, LANES, j), a.chassis, a.fl, a.fr, a.rl, a.rr)
-        keep_slope(buffer, LANES, j, slope)
-
-
-@inlined
-def _rim_slopes(buffer, LANES, given, driven):
-    """Derivative of every lane's stage state, prescribed rims.
-
-    given (15,) : row of stage inputs; driven : exact, 1.0 or 0.0
-    """
-    # Read before the loop: a second array inside it might alias the buffer.
-    rims = rims_at(given)
-    a_x, way, b = given[12], direction_of_travel(given[13]), given[14]
-    for j in range(LANES):
-        _, fl, fr, rl, rr, a = car_on_rims(buffer, LANES, j, rims, a_x, way, b, driven[0])
-        reach = min(min(fl.reach, fr.reach), min(rl.reach, rr.reach))
-        clearance = min(min(fl.clearance, fr.clearance), min(rl.clearance, rr.clearance))
-        buffer[REACH * LANES + j] = min(buffer[REACH * LANES + j], min(reach, clearance))
-        travels = (fl.travel, fr.travel, rl.travel, rr.travel)
-        keep_wheels(buffer, LANES, j, travels, (a.fl_load, a.fr_load, a.rl_load, a.rr_load))
-        # The arms follow from the chassis; their rows are not integrated.
-        slope = slope_of(stage_state(buffer, LANES, j), a.chassis, 0.0, 0.0, 0.0, 0.0)
-        keep_slope(buffer, LANES, j, slope)
-
-
-@inlined
 def _begin(buffer, LANES, cars, states, first):
     """Fill the lanes with cars from `first` on; lanes past the last car repeat it."""
     last = cars.shape[0] - 1
     for j in range(LANES):
         car = min(first + j, last)
-        for row in range(CAR_ROWS):
-            buffer[(CAR + row) * LANES + j] = cars[car, row]
+        take_car(buffer, LANES, j, cars[car])
         for row in range(STATES):
             buffer[(NOW + row) * LANES + j] = states[car, row]
         buffer[REACH * LANES + j] = 1.0
@@ -307,7 +174,7 @@ def integrate_free(
     """
     driven = (road, start, spacing)
     _integrate(
-        _free_slopes,
+        free_slopes,
         driven,
         lanes,
         cars,
@@ -335,7 +202,7 @@ def integrate_rims(
     """
     driven = (exact,)
     _integrate(
-        _rim_slopes,
+        rim_slopes,
         driven,
         lanes,
         cars,

@@ -6,13 +6,27 @@ import numpy as np
 
 from ..frames import GRAVITY
 from ..jit import compiled, inlined
-from .buffer import CAR, ROWS, STAGE, STATES, body_of, corner_of, given_to
-from .contact import find_contacts, read_road
-from .direct import bar_torques
+from .buffer import (
+    BARS,
+    LOADS,
+    ROWS,
+    SLOPE,
+    STAGE,
+    STATES,
+    TRACTION,
+    chassis_at,
+    corner_of,
+    given_to,
+    load_quad,
+    rim_at,
+    take_car,
+)
+from .constrained import bent
 from .forces import direction_of_travel, strut
-from .integrate import car_on_rims, free_car, rims_at
+from .free import corner_at, free_slopes
 from .kinematics import convective_acceleration, pivot, turned
 from .lanes import storer
+from .on_rims import rim_arm_at, rim_corner_at, rim_slopes
 from .vec3 import add, cross, scale, y_cross
 
 
@@ -52,7 +66,8 @@ class CornerOutput(NamedTuple):
     """Negative where the wheel centre has passed the mount of its spring-damper."""
 
 
-OUTPUTS = len(CarOutput._fields) + 4 * len(CornerOutput._fields)
+CORNER, CORNER_SIZE = len(CarOutput._fields), len(CornerOutput._fields)
+OUTPUTS = CORNER + 4 * CORNER_SIZE
 
 store_car, store_corner = storer(CarOutput), storer(CornerOutput)
 
@@ -102,34 +117,16 @@ def _corner_output(corner, chassis, seen, c_dd, arm_dd, force_X, force_Z, road, 
 
 
 @inlined
-def _free_output(corner, chassis, seen, c_dd, arm_dd, given):
-    return _corner_output(
-        corner, chassis, seen, c_dd, arm_dd, seen.force_X, seen.load, given.road, 1.0
-    )
+def _keep_car(out, buffer, c_dd):
+    """Outputs of the whole car after its slopes have been found."""
+    traction, front, rear = buffer[TRACTION], buffer[BARS + 1], buffer[BARS + 3]
+    store_car(out, 0, 1, 0, CarOutput(c_dd.x, c_dd.z, c_dd.pitch, c_dd.roll, traction, front, rear))
 
 
 @inlined
-def _rim_output(corner, chassis, seen, c_dd, arm_dd, load, traction, braking):
-    share = (1.0 - braking) * corner.drive_share + braking * corner.brake_share
-    force_X = share * traction - seen.resistance * load
-    return _corner_output(corner, chassis, seen, c_dd, arm_dd, force_X, load, np.nan, seen.reach)
-
-
-@inlined
-def _car_output(body, c_dd, traction, fl, fr, rl, rr):
-    front, rear = bar_torques(body, fl.arm, fr.arm, rl.arm, rr.arm)
-    return CarOutput(c_dd.x, c_dd.z, c_dd.pitch, c_dd.roll, traction, front, rear)
-
-
-@inlined
-def _store(out, car, fl, fr, rl, rr):
-    first = len(car)
-    size = len(fl)
-    store_car(out, 0, 1, 0, car)
-    store_corner(out, first, 1, 0, fl)
-    store_corner(out, first + size, 1, 0, fr)
-    store_corner(out, first + 2 * size, 1, 0, rl)
-    store_corner(out, first + 3 * size, 1, 0, rr)
+def _keep_corner(out, wheel, found):
+    """Outputs of one wheel."""
+    store_corner(out, CORNER + wheel * CORNER_SIZE, 1, 0, found)
 
 
 @compiled
@@ -139,42 +136,44 @@ def observe_free(car, states, inputs, road, start, spacing, out):
     car (CAR_ROWS,), states (n, 16), inputs (n, 16) as of `integrate_free`, out (n, OUTPUTS)
     """
     buffer = np.zeros(ROWS)
-    buffer[CAR:] = car
-    corner_fl, corner_fr = corner_of(buffer, 0, 1, 0), corner_of(buffer, 1, 1, 0)
-    corner_rl, corner_rr = corner_of(buffer, 2, 1, 0), corner_of(buffer, 3, 1, 0)
+    take_car(buffer, 1, 0, car)
+    driven = (road, start, spacing)
     for i in range(states.shape[0]):
         buffer[STAGE : STAGE + STATES] = states[i]
-        find_contacts(buffer, 1)
-        read_road(buffer, 1, inputs[i], road, start, spacing)
-        chassis, fl, fr, rl, rr, a = free_car(buffer, 1, 0)
-        _store(
-            out[i],
-            _car_output(body_of(buffer, 1, 0), a.chassis, 0.0, fl, fr, rl, rr),
-            _free_output(corner_fl, chassis, fl, a.chassis, a.fl, given_to(buffer, 0, 1, 0)),
-            _free_output(corner_fr, chassis, fr, a.chassis, a.fr, given_to(buffer, 1, 1, 0)),
-            _free_output(corner_rl, chassis, rl, a.chassis, a.rl, given_to(buffer, 2, 1, 0)),
-            _free_output(corner_rr, chassis, rr, a.chassis, a.rr, given_to(buffer, 3, 1, 0)),
-        )
+        free_slopes(buffer, 1, inputs[i], driven)
+        state, chassis = chassis_at(buffer, 1, 0)
+        c, way = load_quad(buffer, SLOPE + 8, 1, 0), direction_of_travel(state.x_rate)
+        _keep_car(out[i], buffer, c)
+        for w in range(4):
+            corner, seen = corner_of(buffer, 4, w), corner_at(buffer, 4, w, state, chassis, way)
+            arm_dd, ground = buffer[SLOPE + 12 + w], given_to(buffer, 4, w).road
+            found = _corner_output(
+                corner, chassis, seen, c, arm_dd, seen.force_X, seen.load, ground, 1.0
+            )
+            _keep_corner(out[i], w, found)
 
 
 @compiled
 def observe_rims(car, states, inputs, exact, out):
     """Outputs of one car in the rims mode; inputs (n, 15) as of `integrate_rims`."""
     buffer = np.zeros(ROWS)
-    buffer[CAR:] = car
-    corner_fl, corner_fr = corner_of(buffer, 0, 1, 0), corner_of(buffer, 1, 1, 0)
-    corner_rl, corner_rr = corner_of(buffer, 2, 1, 0), corner_of(buffer, 3, 1, 0)
+    take_car(buffer, 1, 0, car)
+    driven = (exact,)
     for i in range(states.shape[0]):
         buffer[STAGE : STAGE + STATES] = states[i]
         u = inputs[i]
-        way, b = direction_of_travel(u[13]), u[14]
-        chassis, fl, fr, rl, rr, a = car_on_rims(buffer, 1, 0, rims_at(u), u[12], way, b, exact)
-        c, F = a.chassis, a.traction
-        _store(
-            out[i],
-            _car_output(body_of(buffer, 1, 0), c, F, fl, fr, rl, rr),
-            _rim_output(corner_fl, chassis, fl, c, a.fl, a.fl_load, F, b),
-            _rim_output(corner_fr, chassis, fr, c, a.fr, a.fr_load, F, b),
-            _rim_output(corner_rl, chassis, rl, c, a.rl, a.rl_load, F, b),
-            _rim_output(corner_rr, chassis, rr, c, a.rr, a.rr_load, F, b),
-        )
+        rim_slopes(buffer, 1, u, driven)
+        state, chassis = chassis_at(buffer, 1, 0)
+        c, way, b = load_quad(buffer, SLOPE + 8, 1, 0), direction_of_travel(u[13]), u[14]
+        _keep_car(out[i], buffer, c)
+        for w in range(4):
+            corner = corner_of(buffer, 4, w)
+            arm, reach = rim_arm_at(buffer, w)
+            rim = rim_at(buffer, w)
+            seen = rim_corner_at(buffer, 4, w, rim, arm, state, chassis, way, b)
+            share = (1.0 - b) * corner.drive_share + b * corner.brake_share
+            load = buffer[LOADS + w]
+            force_X = share * buffer[TRACTION] - seen.resistance * load
+            arm_dd = bent(seen.bend, c)
+            found = _corner_output(corner, chassis, seen, c, arm_dd, force_X, load, np.nan, reach)
+            _keep_corner(out[i], w, found)

@@ -192,7 +192,7 @@ def _tally_wheels(buffer, LANES, weight):
                 t.lifted + (1.0 if load <= 0.0 else 0.0),
             )
             _store_wheel(buffer, first, LANES, j, new)
-            car = corner_of(buffer, corner, LANES, j)
+            car = corner_of(buffer, 4 * LANES, corner * LANES + j)
             place = bin_of(travel / car.rest_length, TRAVEL_FROM, TRAVEL_TO)
             buffer[(IN_BINS + 2 * corner) * LANES + j] = place
             place = bin_of(load / car.static_load, LOAD_FROM, LOAD_TO)

@@ -1,8 +1,7 @@
 """Acceleration of a point of the chassis at the stages of a step, and its weighting's filters."""
 
 from ..jit import inlined
-from .buffer import ROWS, slope_at, stage_state, turn_of
-from .kinematics import attitude
+from .buffer import ROWS, chassis_at, slope_at
 from .vec3 import add, cross, dot, times
 
 VERTICAL, HORIZONTAL = 8, 6
@@ -48,9 +47,7 @@ def watch_point(buffer, LANES, stage, point):
     """Note every lane's acceleration at the stage; the middle's is the mean of two stages."""
     x, y, z = point[0], point[1], point[2]
     for j in range(LANES):
-        state = stage_state(buffer, LANES, j)
-        pitch, roll = turn_of(buffer, 0, LANES, j), turn_of(buffer, 1, LANES, j)
-        chassis = attitude(pitch, roll, state.pitch_rate, state.roll_rate)
+        _, chassis = chassis_at(buffer, LANES, j)
         c = slope_at(buffer, LANES, j)
         a_X, a_Y, a_Z = point_acceleration(
             chassis, (x, y, z), c.x_rate, c.z_rate, c.pitch_rate, c.roll_rate
