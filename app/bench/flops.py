@@ -144,36 +144,35 @@ def _count() -> dict[str, int]:
     import numpy as np
 
     from ...engine.car_rows import car_row
-    from ...engine.kernels.buffer import CAR, ROWS, STAGE
-    from ...engine.kernels.integrate import car_on_rims, rims_at
+    from ...engine.kernels.buffer import ROWS, STAGE, take_car
+    from ...engine.kernels.free import free_slopes
+    from ...engine.kernels.on_rims import rim_slopes
     from ...engine.road import Road
     from ...engine.vehicle_file import reference_vehicles
-    from .right_hand_side import free_slope
 
     def traced(trace, values):
-        return [trace.number(float(value)) for value in values]
+        return np.array([trace.number(float(value)) for value in values], dtype=object)
 
     def buffer_of(trace):
         state = np.concatenate(
             [[10.0], np.linspace(0.01, 0.02, 7), [15.0], np.linspace(0.1, 0.2, 7)]
         )
-        buffer = [0.0] * ROWS
+        buffer = np.full(ROWS, 0.0, dtype=object)
         buffer[STAGE : STAGE + 16] = traced(trace, state)
-        buffer[CAR:] = traced(trace, car_row(reference_vehicles()["paper"]))
+        take_car(buffer, 1, 0, traced(trace, car_row(reference_vehicles()["paper"])))
         return buffer
 
     rough = np.sin(np.arange(1000.0))
     found = {}
     for mode, road in (("road", Road(-5.0, 0.1, rough, rough)), ("posts", Road.flat())):
         trace = Trace()
-        cells = np.array(traced(trace, road.coefficients.flat), dtype=object)
-        cells = cells.reshape(road.coefficients.shape)
+        cells = traced(trace, road.coefficients.flat).reshape(road.coefficients.shape)
         acting = traced(trace, np.linspace(0.001, 0.002, 16))
-        free_slope(buffer_of(trace), 1, acting, cells, road.start, road.spacing)
+        free_slopes(buffer_of(trace), 1, acting, (cells, road.start, road.spacing))
         found[mode] = trace.operations
     trace = Trace()
-    rims = rims_at(traced(trace, np.linspace(0.001, 0.002, 12)))
-    car_on_rims(buffer_of(trace), 1, 0, rims, *traced(trace, (1.0, 1.0, 0.1)), 1.0)
+    rims = traced(trace, [*np.linspace(0.001, 0.002, 12), 1.0, 1.0, 0.1])
+    rim_slopes(buffer_of(trace), 1, rims, (1.0,))
     found["rims"] = trace.operations
     return found
 

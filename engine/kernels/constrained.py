@@ -366,9 +366,16 @@ def rims_solution(body, chassis, fl, fr, rl, rr, a_x, exact):
     x = linear_sum(fl.x, fr.x, rl.x, rr.x, own_x)
     paper = 1.0 - exact
     known = -(exact + paper * body.total_mass) * a_x
-    closing = Linear(Quad(exact, 0.0, 0.0, 0.0), paper, known)
-    closing = eliminated(closing, fl.load, -paper * fl.rest.resistance)
-    closing = eliminated(closing, fr.load, -paper * fr.rest.resistance)
-    closing = eliminated(closing, rl.load, -paper * rl.rest.resistance)
-    closing = eliminated(closing, rr.load, -paper * rr.rest.resistance)
+    none = Linear(Quad(0.0, 0.0, 0.0, 0.0), 0.0, 0.0)
+    resistance = linear_add(
+        linear_add(
+            eliminated(none, fl.load, fl.rest.resistance),
+            eliminated(none, fr.load, fr.rest.resistance),
+        ),
+        linear_add(
+            eliminated(none, rl.load, rl.rest.resistance),
+            eliminated(none, rr.load, rr.rest.resistance),
+        ),
+    )
+    closing = eliminated(Linear(Quad(exact, 0.0, 0.0, 0.0), paper, known), resistance, -paper)
     return solve(z, pitch, roll, x, closing)
