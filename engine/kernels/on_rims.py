@@ -183,25 +183,34 @@ def _accelerate_one(buffer, given, a_x, way, braking, exact):
 
 
 @inlined
+def _reached_corner(buffer, WHEELS, wheel, rim, state, chassis, way, braking):
+    """Corner and reach of a wheel."""
+    arm, reach = _reach(buffer, WHEELS, wheel, rim, state, chassis)
+    corner = rim_corner_at(buffer, WHEELS, wheel, rim, arm, state, chassis, way, braking)
+    return corner, reach
+
+
+@inlined
 def _accelerate(buffer, LANES, rims, a_x, way, braking, exact):
     """Lanes side by side."""
     WHEELS = 4 * LANES
     for j in range(LANES):
         state, chassis = turn_chassis(buffer, LANES, j)
-        fl = _reach(buffer, WHEELS, j, rims[0], state, chassis)
-        fr = _reach(buffer, WHEELS, LANES + j, rims[1], state, chassis)
-        rl = _reach(buffer, WHEELS, 2 * LANES + j, rims[2], state, chassis)
-        rr = _reach(buffer, WHEELS, 3 * LANES + j, rims[3], state, chassis)
+        how = state, chassis, way, braking
+        fl, fl_reach = _reached_corner(buffer, WHEELS, j, rims[0], *how)
+        fr, fr_reach = _reached_corner(buffer, WHEELS, LANES + j, rims[1], *how)
+        rl, rl_reach = _reached_corner(buffer, WHEELS, 2 * LANES + j, rims[2], *how)
+        rr, rr_reach = _reached_corner(buffer, WHEELS, 3 * LANES + j, rims[3], *how)
         body = body_of(buffer, LANES, j)
-        front, rear = rim_bar_torques(body, fl[0], fr[0], rl[0], rr[0])
-        fl = _share(buffer, WHEELS, j, rims[0], fl, state, chassis, way, braking, -front)
-        fr = _share(buffer, WHEELS, LANES + j, rims[1], fr, state, chassis, way, braking, front)
-        rl = _share(buffer, WHEELS, 2 * LANES + j, rims[2], rl, state, chassis, way, braking, -rear)
-        rr = _share(buffer, WHEELS, 3 * LANES + j, rims[3], rr, state, chassis, way, braking, rear)
+        front, rear = rim_bar_torques(body, fl.arm, fr.arm, rl.arm, rr.arm)
+        fl_share = rim_share(fl, fl.moment - front, fl_reach)
+        fr_share = rim_share(fr, fr.moment + front, fr_reach)
+        rl_share = rim_share(rl, rl.moment - rear, rl_reach)
+        rr_share = rim_share(rr, rr.moment + rear, rr_reach)
         acceleration, traction = _accelerate_chassis(
-            buffer, LANES, j, state, chassis, fl, fr, rl, rr, a_x, exact
+            buffer, LANES, j, state, chassis, fl_share, fr_share, rl_share, rr_share, a_x, exact
         )
-        _finish_wheel(buffer, WHEELS, j, fl, acceleration, traction)
-        _finish_wheel(buffer, WHEELS, LANES + j, fr, acceleration, traction)
-        _finish_wheel(buffer, WHEELS, 2 * LANES + j, rl, acceleration, traction)
-        _finish_wheel(buffer, WHEELS, 3 * LANES + j, rr, acceleration, traction)
+        _finish_wheel(buffer, WHEELS, j, fl_share, acceleration, traction)
+        _finish_wheel(buffer, WHEELS, LANES + j, fr_share, acceleration, traction)
+        _finish_wheel(buffer, WHEELS, 2 * LANES + j, rl_share, acceleration, traction)
+        _finish_wheel(buffer, WHEELS, 3 * LANES + j, rr_share, acceleration, traction)
