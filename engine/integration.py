@@ -39,6 +39,8 @@ def _columns(field: str) -> list[int]:
 
 
 ARM_ACCELERATIONS = _columns("acceleration")
+_FREE_ACCELERATIONS = [1, 2, 3, *ARM_ACCELERATIONS]
+"""Of all coordinates but x."""
 _REACHES, _CLEARANCES = _columns("reach"), _columns("clearance")
 
 
@@ -164,8 +166,7 @@ def _free_start(cars: Array, inputs: FreeInputs) -> Array:
     x = _wheel_places(cars)[0]
     heights = np.stack([inputs.road.height(k % 2, x[:, k]) for k in range(4)], axis=1)
     uneven = np.any(heights + inputs.stage_inputs[0, 0, :4] != 0.0, axis=1)
-    for car in np.flatnonzero(uneven):
-        states[car] = _free_rest(cars[car], inputs)
+    states[uneven, 1:8] = _free_rest(cars[uneven], inputs)
     states[:, 8] = inputs.initial_speed
     return states
 
@@ -176,8 +177,7 @@ def _rims_start(cars: Array, inputs: RimsInputs) -> Array:
     if inputs.start_state is not None:
         states[:, 1:4], states[:, 9:12] = inputs.start_state[:3], inputs.start_state[3:]
     elif np.any(first[:4] != 0.0):
-        for car, state in zip(cars, states, strict=True):
-            state[:] = _rims_rest(car, first)
+        states[:, 1:4] = _rims_rest(cars, first[:4])
     states[:, 8] = first[13]
     return states
 
@@ -304,44 +304,41 @@ def rims_outputs(car: Array, states: Array, inputs: Array, exact: bool) -> Array
     return out
 
 
-def _free_rest(car: Array, inputs: FreeInputs) -> Array:
-    """State of static equilibrium on the contact points' first heights, x held at 0."""
-    acting = np.zeros(16)
-    acting[:4] = inputs.stage_inputs[0, 0, :4]
+def _free_rest(cars: Array, inputs: FreeInputs) -> Array:
+    """z, pitch, roll and arms (C, 7) of static equilibrium on the contact points' first heights, x
+    held at 0.
+    """
+    acting = np.zeros((2 * 7 + 1, 16))
+    acting[:, :4] = inputs.stage_inputs[0, 0, :4]
 
-    def accelerations(q: Array) -> Array:
+    def accelerations(car: Array, q: Array) -> Array:
         states = np.zeros((len(q), 16))
         states[:, 1:8] = q
-        out = free_outputs(car, states, np.tile(acting, (len(q), 1)), inputs.road)
-        return np.concatenate([out[:, 1:4], out[:, ARM_ACCELERATIONS]], axis=1)
+        out = free_outputs(car, states, acting, inputs.road)
+        return out[:, _FREE_ACCELERATIONS]
 
-    state = np.zeros(16)
-    state[1:8] = _rest(accelerations, np.zeros(7))
-    return state
+    return _rest(accelerations, cars, np.zeros((len(cars), 7)))
 
 
-def _rims_rest(car: Array, first: Array) -> Array:
-    """State of static equilibrium on the wheels' first heights, standing still."""
-    acting = np.zeros(15)
-    acting[:4] = first[:4]
+def _rims_rest(cars: Array, heights: Array) -> Array:
+    """z, pitch and roll (C, 3) of static equilibrium on the wheels' first heights (4,)."""
+    acting = np.zeros((2 * 3 + 1, 15))
+    acting[:, :4] = heights
 
-    def accelerations(q: Array) -> Array:
+    def accelerations(car: Array, q: Array) -> Array:
         states = np.zeros((len(q), 16))
         states[:, 1:4] = q
-        out = rims_outputs(car, states, np.tile(acting, (len(q), 1)), True)
+        out = rims_outputs(car, states, acting, True)
         reached = np.all(out[:, _REACHES] >= 0.0, axis=1)
         return np.where(reached[:, np.newaxis], out[:, 1:4], np.nan)
 
-    state = np.zeros(16)
-    state[1:4] = _rest(accelerations, _plane(car, acting[:4]))
-    return state
+    return _rest(accelerations, cars, _planes(cars, heights))
 
 
-def _plane(car: Array, heights: Array) -> Array:
-    """z, pitch and roll of a rigid car whose wheel centres come nearest to four heights."""
-    x, y = _wheel_places(car)
-    plane = np.column_stack([np.ones(4), -x, y])
-    return np.asarray(np.linalg.lstsq(plane, heights, rcond=None)[0], dtype=np.float64)
+def _planes(cars: Array, heights: Array) -> Array:
+    """z, pitch and roll (C, 3) of rigid cars whose wheel centres come nearest to four heights."""
+    x, y = _wheel_places(cars)
+    return np.linalg.pinv(np.stack([np.ones(x.shape), -x, y], axis=2)) @ heights
 
 
 def _wheel_places(cars: Array) -> tuple[Array, Array]:
@@ -352,20 +349,28 @@ def _wheel_places(cars: Array) -> tuple[Array, Array]:
     return x, corners[..., of("pivot_y")]
 
 
-def _rest(accelerations: Callable[[Array], Array], guess: Array) -> Array:
-    """Coordinates without acceleration, by Newton's method from a guess (size,).
+def _rest(accelerations: Callable[[Array, Array], Array], cars: Array, guess: Array) -> Array:
+    """Coordinates (C, size) of cars (C, CAR_ROWS) without acceleration, by Newton's method.
 
-    accelerations : coordinates (n, size) -> accelerations (n, size)
+    accelerations : car (CAR_ROWS,), coordinates (2 size + 1, size) -> accelerations of that shape
     Not a number where there are none; the car has then failed before its first step.
     """
-    q, size = guess, guess.size
+    q, size = guess.copy(), guess.shape[1]
+    differences = _DIFFERENCE * np.vstack([np.zeros(size), np.eye(size), -np.eye(size)])
+    moving = np.arange(len(cars))
     for _ in range(_NEWTON_STEPS):
-        trials = np.vstack([q, q + _DIFFERENCE * np.eye(size), q - _DIFFERENCE * np.eye(size)])
-        values = accelerations(trials)
-        if np.max(np.abs(values[0])) < _AT_REST:
-            return q
-        jacobian = (values[1 : size + 1] - values[size + 1 :]).T / (2.0 * _DIFFERENCE)
-        if not np.all(np.isfinite(jacobian)):
+        if not moving.size:
             break
-        q = q - np.linalg.lstsq(jacobian, values[0], rcond=None)[0]
-    return np.full(size, np.nan)
+        trials = q[moving, np.newaxis] + differences
+        values = np.stack(
+            [accelerations(cars[k], at) for k, at in zip(moving, trials, strict=True)]
+        )
+        resting = np.max(np.abs(values[:, 0]), axis=1) < _AT_REST
+        lost = ~resting & ~np.isfinite(values).all(axis=(1, 2))
+        q[moving[lost]] = np.nan
+        moving, values = moving[~resting & ~lost], values[~resting & ~lost]
+        jacobians = (values[:, 1 : size + 1] - values[:, size + 1 :]) / (2.0 * _DIFFERENCE)
+        inverses = np.linalg.pinv(jacobians.transpose(0, 2, 1))
+        q[moving] -= np.einsum("cij,cj->ci", inverses, values[:, 0])
+    q[moving] = np.nan
+    return q
