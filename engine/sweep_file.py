@@ -1,9 +1,9 @@
 """A sweep as a file that explains itself: Parquet, Arrow or CSV, one row a car.
 
 Parquet and Arrow hold in their metadata, under "ridetune", the design, the base vehicle, the
-excitation and the columns as JSON; each column has its unit and label besides. Every block is a
-row group (Parquet) or a record batch (Arrow), so neither writing nor reading needs all rows in
-memory. CSV heads its columns `name [unit]` and needs no further package.
+excitation and the columns as JSON; each column has its unit and label besides. They hold their rows
+in groups (row groups in Parquet, record batches in Arrow), so neither writing nor reading needs all
+rows in memory. CSV heads its columns `name [unit]` and needs no further package.
 
 pyarrow is imported by who writes or reads with it: it is an extra, and large.
 """
@@ -16,6 +16,8 @@ from contextlib import AbstractContextManager
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, BinaryIO, Literal, Protocol
+
+import numpy as np
 
 from .designs import Design
 from .errors import SweepError
@@ -33,6 +35,9 @@ ENDINGS: dict[str, Form] = {
     ".csv": "csv",
 }
 """Which form a file has by the end of its name."""
+
+GROUP = 10_000
+"""Rows of a group, at least: Parquet keeps some 80 kB on each in memory until the file is whole."""
 
 KEY = b"ridetune"
 """Where a file's metadata says what was swept."""
@@ -86,7 +91,7 @@ def write_blocks(
         metadata={KEY: json.dumps(described).encode()},
     )
     with _writer(stream, form, schema) as writer:
-        for block in blocks:
+        for block in _grouped(blocks):
             writer.write_batch(pyarrow.record_batch([block[one.name] for one in table], schema))
 
 
@@ -99,6 +104,22 @@ def read_blocks(stream: BinaryIO) -> tuple[dict[str, Any], Iterator[Block]]:
     return json.loads(file.schema_arrow.metadata[KEY]), (
         {name: table[name].to_numpy() for name in table.column_names} for table in batches
     )
+
+
+def _grouped(blocks: Iterable[Block]) -> Iterator[Block]:
+    """The same rows in blocks of GROUP or more, but for the last."""
+    waiting: list[Block] = []
+    for block in blocks:
+        waiting.append(block)
+        if sum(len(one["status"]) for one in waiting) >= GROUP:
+            yield _joined(waiting)
+            waiting = []
+    if waiting:
+        yield _joined(waiting)
+
+
+def _joined(blocks: Sequence[Block]) -> Block:
+    return {name: np.concatenate([one[name] for one in blocks]) for name in blocks[0]}
 
 
 class _Writer(Protocol):

@@ -92,9 +92,11 @@ def ipc_schema(stream):
     return pyarrow.ipc.open_file(stream).schema
 
 
-def test_every_block_is_a_row_group_or_a_batch_of_its_own():
-    assert parquet.ParquetFile(written("parquet")).num_row_groups == 3
-    assert pyarrow.ipc.open_file(written("arrow")).num_record_batches == 3
+@pytest.mark.parametrize(("group", "groups"), [(3, 3), (4, 2), (10, 1)])
+def test_rows_are_written_in_groups_of_whole_blocks(monkeypatch, group, groups):
+    monkeypatch.setattr(sweep_file, "GROUP", group)
+    assert parquet.ParquetFile(written("parquet")).num_row_groups == groups
+    assert pyarrow.ipc.open_file(written("arrow")).num_record_batches == groups
 
 
 def test_csv_holds_every_digit_under_names_with_units(whole):
