@@ -6,6 +6,7 @@ An unknown exception stays a loud 500: logged with its traceback, answered witho
 import logging
 from collections.abc import Mapping
 from http import HTTPStatus
+from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
@@ -88,10 +89,46 @@ def reply_to_errors(app: FastAPI) -> None:
 def _first_complaint(error: RequestValidationError) -> tuple[str, str]:
     complaints = error.errors()
     first = complaints[0]
-    place = ".".join(str(part) for part in first["loc"] if part != "body")[:120] or "body"
-    said = {
-        "missing": "is missing",
-        "extra_forbidden": "is not known here; check its spelling or leave it out",
-    }.get(first["type"], f"is refused: {first['msg'][:1].lower()}{first['msg'][1:200]}")
+    kind, place = first["type"], _place(first, error.body)
+    if kind.startswith("union_tag"):
+        place.append(first["ctx"]["discriminator"].strip("'"))
+    field = ".".join(map(str, place))[:120] or "body"
     more = f" ({len(complaints) - 1} more like this.)" if len(complaints) > 1 else ""
-    return place, f"The field {place} {said}.{more}"
+    return field, f"The field {field} {_said(first)}.{more}"
+
+
+def _place(complaint: Mapping[str, Any], body: Any) -> list[Any]:
+    """Keys and indices that lead to what is complained of, without those names of a union's
+    members that are not in the request.
+    """
+    source, *parts = complaint["loc"]
+    if source != "body":
+        return [source, *parts]
+    place, value = [], body
+    for part in parts:
+        if _holds(value, part):
+            place.append(part)
+            value = value[part]
+    return [*place, parts[-1]] if complaint["type"] == "missing" and parts else place
+
+
+def _holds(value: Any, part: Any) -> bool:
+    """Whether there is such a key or index in a value of the request."""
+    if isinstance(value, list):
+        return isinstance(part, int) and part < len(value)
+    return isinstance(value, Mapping) and part in value
+
+
+def _said(complaint: Mapping[str, Any]) -> str:
+    """What is wrong with a field, as the rest of a sentence about it."""
+    match complaint["type"]:
+        case "missing" | "union_tag_not_found":
+            return "is missing"
+        case "extra_forbidden":
+            return "is not known here; check its spelling or leave it out"
+        case "union_tag_invalid":
+            return f"is refused: input should be one of {complaint['ctx']['expected_tags']}"
+        case "dict_type" | "mapping_type" | "model_type" | "model_attributes_type":
+            return "is refused: input should be an object"
+    message = complaint["msg"]
+    return f"is refused: {message[:1].lower()}{message[1:200]}"

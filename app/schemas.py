@@ -14,6 +14,7 @@ from pydantic import (
     Discriminator,
     Field,
     FiniteFloat,
+    Strict,
     StringConstraints,
     Tag,
 )
@@ -23,15 +24,16 @@ from ..engine import rims_settings
 from ..engine.rims_settings import LOWEST_CUTOFF, InitialState, RimsSettings
 from ..engine.step_limits import LONGEST_SAMPLE_STEP, LONGEST_STEP, SHORTEST_STEP
 
+Number = Annotated[FiniteFloat, Strict()]
+Whole = Annotated[int, Strict()]
+Flag = Annotated[bool, Strict()]
 JsonObject = Mapping[str, Any]
 Name = Annotated[str, StringConstraints(min_length=1, max_length=100)]
 Names = Annotated[list[Name], Field(max_length=200)]
 Traction = Literal["exact", "paper"]
-Cutoff = Annotated[FiniteFloat, Field(ge=LOWEST_CUTOFF)] | None
-RimsStep = Annotated[
-    FiniteFloat, Field(ge=rims_settings.SHORTEST_STEP, le=rims_settings.LONGEST_STEP)
-]
-Intervals = Annotated[list[tuple[FiniteFloat, FiniteFloat]], Field(max_length=100)]
+Cutoff = Annotated[Number, Field(ge=LOWEST_CUTOFF)] | None
+RimsStep = Annotated[Number, Field(ge=rims_settings.SHORTEST_STEP, le=rims_settings.LONGEST_STEP)]
+Intervals = Annotated[list[tuple[Number, Number]], Field(max_length=100)]
 RIMS = RimsSettings()
 
 
@@ -94,39 +96,45 @@ class ExcitationForm(WireForm):
     rims: RimsRequest | None = None
     posts: PostsRequest | None = None
     road: JsonObject | None = None
-    duration: FiniteFloat | None = None
-    lift_off: bool = False
-    step: Annotated[FiniteFloat, Field(ge=SHORTEST_STEP, le=LONGEST_STEP)] | None = None
-    sample_step: Annotated[FiniteFloat, Field(ge=SHORTEST_STEP, le=LONGEST_SAMPLE_STEP)] | None = (
-        None
-    )
+    duration: Number | None = None
+    lift_off: Flag = False
+    step: Annotated[Number, Field(ge=SHORTEST_STEP, le=LONGEST_STEP)] | None = None
+    sample_step: Annotated[Number, Field(ge=SHORTEST_STEP, le=LONGEST_SAMPLE_STEP)] | None = None
 
 
 class SimulationRequest(ExcitationForm):
     """One simulation of the session's car, or of another one."""
 
     vehicle: JsonObject | None = None
-    values: Annotated[dict[Name, FiniteFloat], Field(max_length=200)] = {}
+    values: Annotated[dict[Name, Number], Field(max_length=200)] = {}
     model: Literal["8dof", "7dof"] = "8dof"
     channels: Names | None = None
-    max_samples: Annotated[int, Field(ge=2, le=2_000_000)] | None = None
+    max_samples: Annotated[Whole, Field(ge=2, le=2_000_000)] | None = None
     decimate: Literal["extremes", "stride"] = "extremes"
-    seq: Annotated[int, Field(ge=0, le=2**53)] = 0
-    scene: bool = False
+    seq: Annotated[Whole, Field(ge=0, le=2**53)] = 0
+    scene: Flag = False
 
 
 class SpacedForm(WireForm):
     """Evenly spaced levels, both ends included."""
 
-    low: FiniteFloat
-    high: FiniteFloat
-    count: int
+    low: Number
+    high: Number
+    count: Whole
+
+
+def _list_or_object(value: Any) -> Any:
+    """As `_key_or_object`; the form of the levels is told by what is given."""
+    if not isinstance(value, list | Mapping):
+        raise PydanticCustomError("levels", "give a list of numbers, or low, high and count")
+    return value
 
 
 Levels = Annotated[
     Annotated[SpacedForm, Tag("spaced")]
-    | Annotated[list[FiniteFloat], Field(max_length=10_000), Tag("listed")],
+    | Annotated[list[Number], Field(max_length=10_000), Tag("listed")],
     Discriminator(lambda value: "listed" if isinstance(value, list) else "spaced"),
+    BeforeValidator(_list_or_object),
 ]
 
 
@@ -141,9 +149,9 @@ class SampledForm(WireForm):
     """Cars drawn from a box, (low, high) by parameter, SI."""
 
     kind: Literal["sobol", "latin-hypercube"]
-    ranges: Annotated[dict[Name, tuple[FiniteFloat, FiniteFloat]], Field(max_length=200)]
-    cars: int
-    seed: Annotated[int, Field(ge=0, le=2**53)] = 0
+    ranges: Annotated[dict[Name, tuple[Number, Number]], Field(max_length=200)]
+    cars: Whole
+    seed: Annotated[Whole, Field(ge=0, le=2**53)] = 0
 
 
 class SweepRequest(ExcitationForm):
@@ -158,16 +166,16 @@ class RoadPreview(WireForm):
     """A road as a manoeuvre would build it, seen from above the car at rest."""
 
     road: JsonObject
-    length: Annotated[FiniteFloat, Field(gt=0, le=20_000)] = 200.0
-    torque_end: Annotated[FiniteFloat, Field(ge=0, le=20_000)] = 100.0
-    seed: Annotated[int, Field(ge=0, le=2**53)] = 0
-    points: Annotated[int, Field(ge=2, le=20_000)] = 2000
+    length: Annotated[Number, Field(gt=0, le=20_000)] = 200.0
+    torque_end: Annotated[Number, Field(ge=0, le=20_000)] = 100.0
+    seed: Annotated[Whole, Field(ge=0, le=2**53)] = 0
+    points: Annotated[Whole, Field(ge=2, le=20_000)] = 2000
 
 
 class StartValues(WireForm):
     """Where parameters start, SI, by name."""
 
-    start: Annotated[dict[Name, FiniteFloat], Field(max_length=50)]
+    start: Annotated[dict[Name, Number], Field(max_length=50)]
 
 
 class IdentificationRequest(WireForm):
@@ -180,9 +188,9 @@ class IdentificationRequest(WireForm):
     vehicle: JsonObject | None = None
     free: Names | None = None
     fixed: Names | None = None
-    bounds: Annotated[dict[Name, tuple[FiniteFloat, FiniteFloat]], Field(max_length=50)] = {}
-    start: Annotated[dict[Name, FiniteFloat], Field(max_length=50)] = {}
-    noise: Annotated[dict[Name, FiniteFloat], Field(max_length=50)] = {}
+    bounds: Annotated[dict[Name, tuple[Number, Number]], Field(max_length=50)] = {}
+    start: Annotated[dict[Name, Number], Field(max_length=50)] = {}
+    noise: Annotated[dict[Name, Number], Field(max_length=50)] = {}
     traction: Traction = "exact"
     settings: RimsSettingsForm = RimsSettingsForm()
     braking: Annotated[dict[Name, Intervals], Field(max_length=20)] = {}
