@@ -161,10 +161,10 @@ def number_path(name: str) -> str:
     """Path of a vehicle's number that is given by its path, or by its symbol if it is one of the
     twelve, in any case.
     """
-    known = {path.lower(): path for path in numbers()}
-    known |= {row.symbol.lower(): row.name for row in PARAMETERS}
-    if (path := known.get(name.lower())) is not None:
-        return path
+    paths = {path: path for path in numbers()} | {row.symbol: row.name for row in PARAMETERS}
+    known = {told.lower(): told for told in paths}
+    if (told := known.get(name.lower())) is not None:
+        return paths[told]
     near = get_close_matches(name.lower(), known, n=1)
     hint = f"did you mean {known[near[0]]}?" if near else "e.g. front.suspension.stiffness."
     raise ParameterError(f"No number of a vehicle is called {name!r}; {hint}")

@@ -87,6 +87,7 @@ def test_cars_lie_in_the_box_and_names_are_paths():
         ({"front.suspension.stifness": (1e4, 2e4)}, "did you mean front.suspension.stiffness?"),
         ({"chassis.mas": (1e3, 2e3)}, "did you mean chassis.mass?"),
         ({"colour": (1, 2)}, "No number of a vehicle is called 'colour'"),
+        ({"K_G": (1, 2)}, "did you mean K_R?"),
         ({"K_F": (1e4, 2e4), PATHS[0]: (1e4, 2e4)}, f"{PATHS[0]} is swept twice, as K_F and as"),
         ({"K_F": (2e4, 1e4)}, "20000 to 10000 N/m, are crossed or leave no room"),
         ({"K_F": (2e4, 2e4)}, "crossed or leave no room"),
