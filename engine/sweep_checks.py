@@ -84,11 +84,11 @@ def _run(car: Vehicle, excitation: Excitation) -> None:
 
 
 def _span(seconds: float) -> str:
-    """A time as a person says it."""
-    for unit, size in (("years", 3.156e7), ("days", 86400.0), ("hours", 3600.0)):
-        if seconds > 2.0 * size:
-            return f"{seconds / size:.2g} {unit}"
-    return f"{seconds:.2g} s"
+    """A time as a person says it, without an exponent where one can read it."""
+    units = (("years", 3.156e7), ("days", 86400.0), ("hours", 3600.0), ("s", 1.0))
+    unit, size = next((one for one in units if seconds > 2.0 * one[1]), units[-1])
+    count = seconds / size
+    return f"{count:.0f} {unit}" if 10.0 <= count < 1e5 else f"{count:.2g} {unit}"
 
 
 def _check_step(vehicle: Vehicle, design: Design, excitation: Excitation, step: float) -> None:

@@ -283,4 +283,4 @@ def test_too_many_cars_are_refused_with_the_time_they_would_take():
     said = (
         r"1e\+12 cars are asked for, a sweep takes at most 1e\+08; at \S+ s a car they would take"
     )
-    assert refused.match(said + r" \S+ years; take fewer\.")
+    assert refused.match(said + r" \d+(\.\d+)? years; take fewer\.")
