@@ -63,7 +63,8 @@ def prepare_free(demand: Demand, step: float, sample_step: float) -> FreeInputs:
     inputs = _PREPARED.get((demand, step, sample_step))
     if inputs is None:
         inputs = _prepare(demand, step, sample_step)
-        _PREPARED.keep((demand, step, sample_step), inputs, inputs.stage_inputs.size)
+        size = inputs.stage_inputs.size + inputs.sample_inputs.size + demand.size
+        _PREPARED.keep((demand, step, sample_step), inputs, size)
     return inputs
 
 

@@ -1,11 +1,18 @@
 """Steps, samples and what acts during them."""
 
+import gc
+import weakref
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from ridetune.engine import stepping
 from ridetune.engine.demand import Demand, PiecewiseLinear, PostMotion
 from ridetune.engine.errors import SimulationError
 from ridetune.engine.kernels.observe import OUTPUTS
+from ridetune.engine.remembered import Remembered
+from ridetune.engine.road import Road
 from ridetune.engine.stepping import SAMPLE_BYTES, STEP_BYTES, prepare_free
 
 JUMP = 0.0123
@@ -48,6 +55,22 @@ def test_posts_follow_their_spline_with_its_rate():
     middle = np.cumsum(inputs.steps) - 0.5 * inputs.steps
     assert_allclose(inputs.stage_inputs[:, 1, 0], cubic(middle), atol=1e-14)
     assert_allclose(inputs.stage_inputs[:, 1, 7], cubic.deriv()(middle), atol=1e-12)
+
+
+def test_a_demand_with_a_long_road_is_let_go_when_another_comes(monkeypatch):
+    """Oracle: the garbage collector; two roads of 80 000 numbers do not fit into 100 000."""
+    monkeypatch.setattr(stepping, "_PREPARED", Remembered(100_000))
+
+    def on_a_long_road():
+        flat = np.zeros(10_001)
+        driven = replace(demand(), road=Road(0.0, 0.1, flat, flat))
+        prepare_free(driven, step=0.002, sample_step=0.005)
+        return weakref.ref(driven)
+
+    first, second = on_a_long_road(), on_a_long_road()
+    gc.collect()
+    assert first() is None
+    assert second() is not None
 
 
 def test_the_stated_memory_of_a_step_is_at_least_its_arrays():
