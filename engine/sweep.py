@@ -118,7 +118,7 @@ def _blocks(
             done += len(some)
             failed += int(np.sum(parts[-1]["status"] != OK))
             taken = time.perf_counter() - started
-            part = int(np.clip(part * LOOK_EVERY / taken, threads, BLOCK))
+            part = int(np.clip(len(some) * LOOK_EVERY / taken, threads, BLOCK))
             if progress is not None:
                 progress(Progress(done, design.cars, failed, time.perf_counter() - began))
         yield {

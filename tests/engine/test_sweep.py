@@ -4,6 +4,7 @@ import itertools
 import os
 import tracemalloc
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -186,6 +187,25 @@ def test_memory_does_not_grow_with_the_number_of_cars(monkeypatch):
 
     peak(100)
     assert peak(3000) < 1.2 * peak(300)
+
+def test_a_block_that_ends_early_makes_the_next_look_no_later(monkeypatch):
+    """Oracle: a clock on which every car takes 10 ms; a look each half second is due."""
+    clock = [0.0]
+
+    def slowly(cars, excitation, *, threads):
+        clock[0] += 0.01 * len(cars)
+        return ready_made(cars, excitation, threads=threads)
+
+    monkeypatch.setattr(module, "side_by_side", lambda *_: None)
+    monkeypatch.setattr(module, "figures_of", slowly)
+    monkeypatch.setattr(module, "time", SimpleNamespace(perf_counter=lambda: clock[0]))
+    monkeypatch.setattr(module, "BLOCK", 59)
+    seen = []
+    for _ in sweep(CAR, Sobol(RANGES, 256), ROUGH, threads=1, progress=seen.append):
+        pass
+    looks = np.diff([0.0, *(one.seconds for one in seen)])
+    assert np.all(looks <= module.LOOK_EVERY + 1e-9)
+
 
 
 STIFF = {"front.suspension.damping": (1e3, 2e5), "K_F": (1e4, 4e4)}
