@@ -139,25 +139,19 @@ def _together(
     """Figures and status of cars with some values (cars, parameters), in one batch."""
     cars = together.rows(vehicle, design.names, values)
     stable = together.stable(cars)
-    status = np.full(len(values), OK, dtype=object)
-    for k in np.flatnonzero(~stable):
-        status[k] = _refusal(vehicle, design, values[k], excitation)
     rows: Block = {figure.name: np.full(len(values), np.nan) for figure in figures()}
+    rows["status"] = np.full(len(values), OK, dtype=object)
     if stable.any():
         found, told = together.figures(cars[stable], threads)
         for name, column in found.items():
             rows[name][stable] = column
-        status[stable] = np.where(told == "", OK, told)
-    return rows | {"status": status}
-
-
-def _refusal(vehicle: Vehicle, design: Design, values: NDArray, excitation: Excitation) -> str:
-    """Why there is no such car, or why it does not take the step."""
-    try:
-        excitation.simulate(_car(vehicle, design, values))
-    except RideError as error:
-        return reason(error)
-    return OK
+        rows["status"][stable] = np.where(told == "", OK, told)
+    if not stable.all():
+        # There is no such car, or it does not take the step: alone, it says why.
+        alone = _one_by_one(vehicle, design, values[~stable], excitation, threads)
+        for name, column in alone.items():
+            rows[name][~stable] = column
+    return rows
 
 
 def _one_by_one(

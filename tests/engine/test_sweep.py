@@ -130,6 +130,22 @@ def test_a_car_that_cannot_exist_or_leaves_the_models_range_fails_alone():
     assert table["chassis.z.rms"][0] == pytest.approx(expected, rel=1e-9)
 
 
+def test_a_car_that_the_batch_does_not_take_is_simulated_alone(monkeypatch):
+    """Oracle: the simulation of the same car; one that is sound has all its figures."""
+
+    def picky(excitation, cars):
+        together = side_by_side(excitation, cars)
+        return replace(together, _stable=lambda rows: np.arange(len(rows)) != 1)
+
+    monkeypatch.setattr(module, "side_by_side", picky)
+    design, excitation = Sobol(SPRINGS, 3), FreeExcitation(BUMP)
+    table = rows(CAR, design, excitation)
+    assert set(table["status"]) == {OK}
+    alone = metrics(excitation.simulate(car_of(CAR, design, 1)).run)
+    for metric in alone:
+        assert table[metric.name][1] == metric.value
+
+
 @pytest.mark.skipif(CORES < 2, reason="one core")
 def test_threads_change_nothing():
     design = Sobol(RANGES, 6)
@@ -172,22 +188,6 @@ def test_blocks_join_and_the_last_progress_is_the_whole(monkeypatch):
     assert (seen[-1].cars, seen[-1].of) == (250, 250)
 
 
-def test_memory_does_not_grow_with_the_number_of_cars(monkeypatch):
-    monkeypatch.setattr(module, "side_by_side", lambda *_: None)
-    monkeypatch.setattr(module, "figures_of", ready_made)
-    monkeypatch.setattr(module, "BLOCK", 100)
-
-    def peak(cars):
-        tracemalloc.start()
-        for _ in sweep(CAR, Sobol(RANGES, cars), ROUGH):
-            pass
-        most = tracemalloc.get_traced_memory()[1]
-        tracemalloc.stop()
-        return most
-
-    peak(100)
-    assert peak(3000) < 1.2 * peak(300)
-
 def test_a_block_that_ends_early_makes_the_next_look_no_later(monkeypatch):
     """Oracle: a clock on which every car takes 10 ms; a look each half second is due."""
     clock = [0.0]
@@ -206,6 +206,22 @@ def test_a_block_that_ends_early_makes_the_next_look_no_later(monkeypatch):
     looks = np.diff([0.0, *(one.seconds for one in seen)])
     assert np.all(looks <= module.LOOK_EVERY + 1e-9)
 
+
+def test_memory_does_not_grow_with_the_number_of_cars(monkeypatch):
+    monkeypatch.setattr(module, "side_by_side", lambda *_: None)
+    monkeypatch.setattr(module, "figures_of", ready_made)
+    monkeypatch.setattr(module, "BLOCK", 100)
+
+    def peak(cars):
+        tracemalloc.start()
+        for _ in sweep(CAR, Sobol(RANGES, cars), ROUGH):
+            pass
+        most = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return most
+
+    peak(100)
+    assert peak(3000) < 1.2 * peak(300)
 
 
 STIFF = {"front.suspension.damping": (1e3, 2e5), "K_F": (1e4, 4e4)}
