@@ -114,6 +114,7 @@ def _same(a: FreeInputs, b: FreeInputs) -> bool:
     if a is b:
         return True
     arrays = (
+        (a.steps, b.steps),
         (a.stage_inputs, b.stage_inputs),
         (a.samples, b.samples),
         (a.road.coefficients, b.road.coefficients),
