@@ -37,7 +37,7 @@ ENDINGS: dict[str, Form] = {
 """Which form a file has by the end of its name."""
 
 GROUP = 10_000
-"""Rows of a group, at least: Parquet keeps some 80 kB on each in memory until the file is whole."""
+"""Rows of a group, at least: Parquet keeps some 50 kB on each in memory until the file is whole."""
 
 KEY = b"ridetune"
 """Where a file's metadata says what was swept."""
@@ -132,7 +132,8 @@ def _writer(stream: BinaryIO, form: Form, schema: Any) -> AbstractContextManager
     if form == "parquet":
         from pyarrow import parquet
 
-        return parquet.ParquetWriter(stream, schema)
+        # Figures hardly ever repeat; a dictionary of them would be written besides.
+        return parquet.ParquetWriter(stream, schema, use_dictionary=False)
     from pyarrow import ipc
 
     return ipc.new_file(stream, schema)

@@ -99,6 +99,19 @@ def test_rows_are_written_in_groups_of_whole_blocks(monkeypatch, group, groups):
     assert pyarrow.ipc.open_file(written("arrow")).num_record_batches == groups
 
 
+def test_a_number_takes_no_more_than_its_eight_bytes_in_parquet():
+    """Oracle: the size of a double, of what never repeats; Parquet's account of a group is 1 %."""
+    rng, told = np.random.default_rng(1), description(CAR, DESIGN, EXCITATION)
+    names = [column.name for column in columns(DESIGN)][1:-1]
+    size = {}
+    for cars in (10, 20_000):
+        block = {"car": np.arange(cars), "status": np.full(cars, OK, dtype=object)}
+        stream = io.BytesIO()
+        write_blocks(stream, "parquet", told, [block | {one: rng.random(cars) for one in names}])
+        size[cars] = len(stream.getvalue())
+    assert size[20_000] - size[10] <= 1.01 * 8 * 20_000 * (len(names) + 1)
+
+
 def test_csv_holds_every_digit_under_names_with_units(whole):
     rows = list(csv.reader(io.TextIOWrapper(written("csv"), "utf-8", newline="")))
     assert rows[0][:3] == ["car", "front.suspension.stiffness [N/m]", "chassis.mass [kg]"]
