@@ -22,7 +22,10 @@ from .worker import Report, WithFile
 KIND = "sweep"
 
 STATUS_BYTES = 100
-"""What a car's status takes in the file, at most."""
+"""What a car's status takes in the file, at most: a failed car has a sentence, but no figures."""
+
+FRAME_BYTES = 100_000
+"""What the file takes besides: what was swept, and Parquet's account of its columns."""
 
 
 def sweep(store: Store, recordings: Recordings) -> Kind:
@@ -65,7 +68,7 @@ def most_bytes(request: SweepRequest) -> int:
     from ..engine.sweep import columns
 
     design = design_of(request.design)
-    return design.cars * (8 * len(columns(design)) + STATUS_BYTES)
+    return FRAME_BYTES + design.cars * (8 * len(columns(design)) + STATUS_BYTES)
 
 
 def check_and_fill(

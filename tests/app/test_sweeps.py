@@ -10,6 +10,7 @@ from numpy.testing import assert_array_equal
 from pyarrow import feather, parquet
 from ridetune.app.schemas import SweepRequest
 from ridetune.app.settings import Limits, Settings
+from ridetune.app.sweep_job import most_bytes
 from ridetune.engine.designs import Sobol
 from ridetune.engine.excitation import FreeExcitation
 from ridetune.engine.figures import OK, figures
@@ -112,6 +113,12 @@ def test_the_rows_come_in_every_form(engineer, done):
     read = np.array([float(line.split(",")[2]) for line in lines[1:]])
     assert_array_equal(read, table["chassis.mass"].to_numpy())
     assert engineer.get(f"{place}.xlsx").status_code == 422
+
+
+def test_a_file_is_no_larger_than_was_held_against_the_session_s_room(engineer, done):
+    """Of few cars it is hardly more than what it says of itself."""
+    written = len(engineer.get(f"/sweeps/{done['id']}/cars.parquet").content)
+    assert written <= most_bytes(SweepRequest.model_validate({"design": BOX, **BUMP}))
 
 
 def test_what_a_sweep_shows_repeats_it(engineer, done):
