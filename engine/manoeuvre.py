@@ -23,7 +23,7 @@ from .json_text import read_json
 from .post_sweep import PostSweep
 from .remembered import Remembered
 from .road import Road
-from .road_specs import FlatRoad, Place, RoadSpec
+from .road_specs import FlatRoad, IsoRoad, Place, RoadSpec
 from .torque_laws import LONGEST, BrakeLaw, DriveLaw, Speed
 from .vehicle import Pivot, Range, StabilizerBar, Suspension, Vehicle, field_types
 
@@ -53,7 +53,7 @@ _DEMANDS: Remembered[Any, Demand] = Remembered(4_000_000)
 """The last demands, by manoeuvre, car as far as it matters and road; sizes in numbers."""
 
 ORDER = (
-    *("1", "2", "brake", "coast", "constant-speed-c", "bump", "pothole", "sine-sweep"),
+    *("1", "2", "brake", "brake-54", "coast", "constant-speed-c", "bump", "pothole", "sine-sweep"),
     *("heave", "pitch", "roll", "warp"),
 )
 """Keys of the manoeuvres that come with the package, as a person meets them."""
@@ -103,6 +103,24 @@ class Manoeuvre:
                 " it."
             )
         return replace(self, duration=duration)
+
+    def roughened(
+        self,
+        class_factor: float | None = None,
+        band: tuple[float, float] | None = None,
+        seed: int | None = None,
+    ) -> "Manoeuvre":
+        """This manoeuvre with another random road, as far as told; itself on any other road.
+
+        class_factor, band : as of `IsoRoad`; ManoeuvreError outside what a file may say
+        """
+        if not isinstance(self.road, IsoRoad):
+            return self
+        data = manoeuvre_to_json(self)
+        told = {"class_factor": class_factor, "band": band and list(band)}
+        data["road"] |= {name: value for name, value in told.items() if value is not None}
+        data["seed"] = self.seed if seed is None else seed
+        return manoeuvre_from_json(data, self.name)
 
     def demand(self, vehicle: Vehicle, road: Road | None = None) -> Demand:
         """What this manoeuvre asks of one car: its torques, and its road or posts.

@@ -22,6 +22,7 @@ from ridetune.engine.parameters import PARAMETER_NAMES
 from ridetune.engine.road import LEFT, RIGHT
 from ridetune.engine.torque_laws import DriveTable
 from ridetune.engine.vehicle import Brakes
+from scipy import signal
 
 from ..factories import paper_vehicle
 
@@ -144,6 +145,37 @@ def test_another_seed_is_another_road_and_the_same_torques():
     one, other = manoeuvre.demand(vehicle), replace(manoeuvre, seed=99).demand(vehicle)
     assert np.array_equal(one.drive.values, other.drive.values)
     assert not np.allclose(one.road.left, other.road.left)
+
+
+def test_a_road_of_half_the_power_from_a_lowest_frequency_on_has_that_spectrum():
+    """Oracle: Gd(n) of ISO 8608 by Welch's method on 10 km of class C; an octave from n holds
+    n * length waves on each track, and Hann windows of 205 m spread a bin over 0.005 cycle/m.
+    """
+    lowest, manoeuvre = 0.03, reference_manoeuvres()["constant-speed-c"].lasting(500.0)
+    driven = manoeuvre.roughened(0.5, (lowest, 2.83), seed=8)
+    road = driven.demand(paper_vehicle()).road
+    n, left = signal.welch(road.left[40:], fs=1 / road.spacing, nperseg=4096)
+    psd = 0.5 * (left + signal.welch(road.right[40:], fs=1 / road.spacing, nperseg=4096)[1])
+    for low in (0.05, 0.1, 0.2, 0.4, 0.8):
+        octave = (n >= low) & (n < 2 * low)
+        ratio = np.mean(psd[octave] / (0.5 * 256e-6 * (n[octave] / 0.1) ** -2))
+        assert abs(ratio - 1.0) < 4 / np.sqrt(1e4 * low) + 0.01
+    assert psd[n < lowest - 0.01].sum() < 1e-3 * psd.sum()
+
+
+def test_the_road_options_are_those_of_the_file_and_leave_other_roads_alone():
+    rough = reference_manoeuvres()["2"].roughened(0.5, (0.03, 2.0), seed=9)
+    data = manoeuvre_to_json(rough)
+    assert (data["road"]["class_factor"], data["road"]["band"]) == (0.5, [0.03, 2.0])
+    assert data["seed"] == 9
+    assert manoeuvre_from_json(data) == rough
+    assert reference_manoeuvres()["2"].roughened() == reference_manoeuvres()["2"]
+    bump = reference_manoeuvres()["bump"]
+    assert bump.roughened(0.5, seed=9) is bump
+    with pytest.raises(ManoeuvreError, match=r"road.class_factor is 0.0, but must lie between"):
+        reference_manoeuvres()["2"].roughened(0.0)
+    with pytest.raises(ManoeuvreError, match="band must rise"):
+        reference_manoeuvres()["2"].roughened(band=(1.0, 0.5))
 
 
 def test_braking_takes_the_stated_level_and_shares():
