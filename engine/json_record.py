@@ -36,10 +36,7 @@ class RecordReader:
             raise self.refuse(path, f"must be an object {{...}}, not {describe(data)}.")
         hints = get_type_hints(kind, include_extras=True)
         keys = {field.name.rstrip("_"): field for field in fields(kind)}
-        known = [*keys, "kind"] if _kind(kind) else list(keys)
-        for key in data:
-            if key not in known:
-                raise self.refuse(_join(path, str(key)), f"is not known; {_hint(key, known)}")
+        self.check_keys(data, [*keys, "kind"] if _kind(kind) else list(keys), path)
         values = {}
         for key, field in keys.items():
             place = _join(path, key)
@@ -52,6 +49,12 @@ class RecordReader:
             return kind(**values)
         except RideError as error:
             raise self.error(f"{self.source}: {path + ': ' if path else ''}{error}") from error
+
+    def check_keys(self, data: Mapping[str, Any], known: Sequence[str], path: str) -> None:
+        """Refuse a key of an object that is none of those known."""
+        for key in data:
+            if key not in known:
+                raise self.refuse(_join(path, str(key)), f"is not known; {_hint(key, known)}")
 
     def value(self, hint: Any, data: Any, path: str, accepted: Range | None = None) -> Any:
         """One value as its type, or an error that says what it should be."""
