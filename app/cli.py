@@ -60,7 +60,7 @@ def command_line() -> "Parser":
     _describe_simulate(add("simulate", _simulate, "Simulate a car on a road, from rims or posts."))
     _describe_sweep(add("sweep", _sweep, "Simulate many cars, one row a car."))
     _describe_identify(add("identify", _identify, "Identify a car's parameters from recordings."))
-    _describe_campaign(add("campaign", _campaign, "Make the two manoeuvres' measurement files."))
+    _describe_campaign(add("campaign", _campaign, "Measure a car that is known, as files."))
     _describe_bench(add("bench", _bench, "Measure the engine and its peers on this machine."))
     return parser
 
@@ -201,8 +201,31 @@ def _describe_campaign(command: Parser) -> None:
         default="concept",
         help="car to drive; the detailed one is not available yet",
     )
-    _add_noise(command, "noise to add")
+    command.add_argument(
+        "--vehicle", metavar="FILE", default="paper", help="the concept car; paper unless told"
+    )
+    command.add_argument(
+        "--manoeuvre",
+        metavar="NAME",
+        nargs="+",
+        action="extend",
+        help="1 2 brake-54 bump constant-speed-c unless told; or files",
+    )
+    command.add_argument(
+        "--class-factor", metavar="X", type=float, help="power of random roads; 0.5: lower limit"
+    )
+    command.add_argument("--band", metavar="LOW:HIGH", help="of random roads, cycle/m")
+    command.add_argument("--road-seed", metavar="N", type=_seed, help="other random roads")
+    command.add_argument("--sensors", metavar="FILE", help="the sensors, TOML or JSON")
+    _add_noise(command, "noise of the usual sensors")
     command.add_argument("--seed", metavar="N", type=_seed, default=0, help="of the noise")
+    command.add_argument(
+        "--format", choices=("csv", "mf4"), default="csv", dest="form", help="csv unless told"
+    )
+    command.add_argument("--date", metavar="DATE", help="of the drives; now unless told")
+    command.add_argument(
+        "--processes", metavar="N", type=int, help="one a core unless told, or none besides this"
+    )
     command.add_argument("-o", "--output", metavar="DIR", required=True, help="folder to fill")
     command.add_argument("--force", action="store_true", help="write over files that are there")
 

@@ -74,6 +74,12 @@ class SweepError(RideError):
     code = "sweep"
 
 
+class CampaignError(RideError):
+    """A campaign cannot be driven as asked, or some of its recordings are not whole."""
+
+    code = "campaign"
+
+
 class Cancelled(RideError):
     """The caller asked for the work to stop."""
 

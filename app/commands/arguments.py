@@ -75,6 +75,11 @@ def levels(assignments: Iterable[str]) -> dict[str, Spaced | list[float]]:
     return found
 
 
+def band(text: str) -> tuple[float, float]:
+    """Lowest and highest spatial frequency out of LOW:HIGH."""
+    return _two_numbers(text, f"--band {text}", "LOW:HIGH in cycle/m")
+
+
 def whole(text: str, argument: str, form: str) -> int:
     """A whole number, which may be written like 1e6; other arguments as of a number's."""
     with suppress(ValueError):

@@ -94,6 +94,12 @@ def make_folder(path: str | Path) -> Path:
     return path
 
 
+def require_writable(folder: Path) -> None:
+    """Refuse a folder that no file can be written to, before the work is done for it."""
+    if not os.access(folder, os.W_OK):
+        raise OutputError(f"{folder}: this folder does not let you write; choose another with -o.")
+
+
 def refuse_to_overwrite(paths: Iterable[Path]) -> None:
     """Refuse before the first of several files is written where one of them is already there.
 

@@ -1,10 +1,7 @@
 """`ridetune sweep`: a design of cars through the same excitation, one row a car."""
 
-import sys
-import time
 from argparse import Namespace
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 
 from ...engine.designs import Design, FullFactorial, LatinHypercube, Sobol
@@ -30,9 +27,7 @@ from .output import (
     write_file,
 )
 from .sweep_summary import Summary
-
-TELL_EVERY = 10.0
-"""Time between two lines of progress where no terminal shows them, s."""
+from .watch import left, watch
 
 
 def sweep(options: Namespace) -> None:
@@ -43,7 +38,7 @@ def sweep(options: Namespace) -> None:
     numbers = _numbers(options.histories, design.cars)
     vehicle, driven = find_vehicle(options.vehicle), excitation(options, mode)
     summary = Summary()
-    with _watch() as progress:
+    with watch(_line) as progress:
         blocks = sweep_cars(vehicle, design, driven, threads=options.threads, progress=progress)
         files = _history_files(options, numbers, inputs)
         with whole_file(options.output) as stream:
@@ -122,38 +117,10 @@ def _write_histories(
         print(f"Wrote {path} and its vehicle.")
 
 
-@contextmanager
-def _watch() -> Iterator["_Watch"]:
-    """Progress on standard error: one line on a terminal that ends with the block, else lines."""
-    watch = _Watch()
-    try:
-        yield watch
-    finally:
-        if watch.terminal:
-            print("\r\033[K", end="", file=sys.stderr, flush=True)
-
-
-class _Watch:
-    """Tells how far a sweep is."""
-
-    def __init__(self):
-        self.terminal = sys.stderr.isatty()
-        self._told = time.monotonic()
-
-    def __call__(self, now: Progress) -> None:
-        """Take the latest progress."""
-        if self.terminal:
-            print(f"\r{_line(now)}\033[K", end="", file=sys.stderr, flush=True)
-        elif time.monotonic() - self._told >= TELL_EVERY:
-            self._told = time.monotonic()
-            print(_line(now), file=sys.stderr, flush=True)
-
-
 def _line(now: Progress) -> str:
     speed = now.cars / now.seconds
-    left = round((now.of - now.cars) / speed)
     failed = f", {now.failed} failed" if now.failed else ""
     return (
         f"{now.cars} of {now.of} cars{failed}, {speed:.3g} cars/s,"
-        f" {left // 3600}:{left // 60 % 60:02}:{left % 60:02} left"
+        f" {left(now.cars, now.of, now.seconds)}"
     )

@@ -11,7 +11,7 @@ import math
 import sys
 
 import numpy as np
-from ridetune.engine.campaign import drive_campaign
+from ridetune.engine.campaign import drive_table_2
 from ridetune.engine.fit import Fit
 from ridetune.engine.identification import Problem, identify
 from ridetune.engine.parameters import PARAMETERS
@@ -33,7 +33,7 @@ def main(seeds: int) -> None:
     start = {name: truth[name] * f for name, f in zip(truth, START_FACTORS, strict=True)}
     fits: list[Fit] = []
     for seed in range(seeds):
-        runs = drive_campaign(car, noise=NOISE, seed=seed)
+        runs = drive_table_2(car, noise=NOISE, seed=seed)
         fits.append(identify(Problem.build(car, runs, start=start)))
         print(f"seed {seed}: {fits[-1].seconds:.1f} s, {fits[-1].outcome}", file=sys.stderr)
     print("| parameter | true | mean | scatter % | mean std error % | covered | yes/weakly/no |")

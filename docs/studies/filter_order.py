@@ -10,11 +10,12 @@ filters of several orders in place of `filters.ORDER`, and without any filter at
 from dataclasses import replace
 
 from ridetune.engine import filters
-from ridetune.engine.campaign import CAMPAIGN, RECORDED
+from ridetune.engine.campaign import TABLE_2
 from ridetune.engine.channels import Run
 from ridetune.engine.identification import Problem, identify
 from ridetune.engine.manoeuvre import reference_manoeuvres
 from ridetune.engine.rims_settings import RimsSettings
+from ridetune.engine.sensors import RECORDED
 from ridetune.engine.simulation import simulate_road
 from ridetune.engine.vehicle_file import reference_vehicles
 
@@ -26,7 +27,7 @@ CAR = reference_vehicles()["paper"]
 def runs(sample_step: float) -> list[Run]:
     """Both manoeuvres as a test car would record them."""
     found = []
-    for key in CAMPAIGN:
+    for key in TABLE_2:
         run = simulate_road(CAR, reference_manoeuvres()[key], sample_step=sample_step).run
         found.append(replace(run, channels={name: run[name] for name in RECORDED}))
     return found

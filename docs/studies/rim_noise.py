@@ -9,12 +9,12 @@ channels alone, sampled every 5 ms and every 1 ms. Prints the table of docs/iden
 from dataclasses import replace
 
 import numpy as np
-from ridetune.engine.campaign import RECORDED
 from ridetune.engine.channels import WHEEL_CHANNELS, Run
 from ridetune.engine.identification import Problem, identify
 from ridetune.engine.manoeuvre import reference_manoeuvres
 from ridetune.engine.parameters import PARAMETERS
 from ridetune.engine.rims_settings import RimsSettings
+from ridetune.engine.sensors import RECORDED
 from ridetune.engine.simulation import simulate_road
 from ridetune.engine.vehicle import Vehicle
 from ridetune.engine.vehicle_file import reference_vehicles

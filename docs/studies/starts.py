@@ -10,7 +10,7 @@ Prints how many fits ended at the lowest cost of all, and how the others ended.
 from collections import Counter
 
 import numpy as np
-from ridetune.engine.campaign import drive_campaign
+from ridetune.engine.campaign import drive_table_2
 from ridetune.engine.errors import ProblemError
 from ridetune.engine.identification import Problem, identify
 from ridetune.engine.parameters import PARAMETERS, default_bounds
@@ -25,7 +25,7 @@ SAME_COST = 1e-4
 def main() -> None:
     """Fit from every start and print what became of them."""
     car = reference_vehicles()["paper"]
-    runs = drive_campaign(car, noise=DEFAULT_NOISE)
+    runs = drive_table_2(car, noise=DEFAULT_NOISE)
     bounds = {row.name: default_bounds(row.name, car.value(row.name)) for row in PARAMETERS}
     rng = np.random.default_rng(0)
     costs, outcomes, moved = [], [], 0

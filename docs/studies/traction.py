@@ -6,7 +6,7 @@ Noise-free twin: wheel centres and a_x of the reference car driven directly thro
 of Table 2, sampled every 5 ms. Prints the table of docs/identification.md.
 """
 
-from ridetune.engine.campaign import drive_campaign
+from ridetune.engine.campaign import drive_table_2
 from ridetune.engine.identification import Problem, identify
 from ridetune.engine.parameters import PARAMETERS
 from ridetune.engine.rims_settings import RimsSettings
@@ -16,7 +16,7 @@ from ridetune.engine.vehicle_file import reference_vehicles
 def main() -> None:
     """Fit the twin in four ways and print how far every parameter is off."""
     car = reference_vehicles()["paper"]
-    runs = drive_campaign(car)
+    runs = drive_table_2(car)
     ways = {
         "exact": ("exact", RimsSettings()),
         "exact, a_x unfiltered": ("exact", RimsSettings(a_x_cutoff_hz=None)),

@@ -15,6 +15,7 @@ from numpy.testing import assert_allclose
 from ridetune.app.cli import main
 from ridetune.engine.channels import Run
 from ridetune.engine.measurement import read_run, write_run
+from ridetune.engine.sensors import RECORDED as SENSED
 from ridetune.engine.vehicle_file import read_vehicle, reference_vehicles, write_vehicle
 
 SHORT = {
@@ -25,8 +26,7 @@ SHORT = {
     "road": {"kind": "iso8608", "sections": [{"class": "C"}]},
     "seed": 1,
 }
-RECORDED = ["chassis.z", "chassis.pitch", "chassis.roll", "chassis.a_x", "chassis.v_x"]
-RECORDED += [f"wheel.{corner}.z" for corner in ("fl", "fr", "rl", "rr")]
+RECORDED = list(SENSED)
 
 
 @pytest.fixture
@@ -346,6 +346,74 @@ def test_campaign_records_both_manoeuvres_with_the_noise_asked_for(folder, capsy
         assert error["chassis.pitch"] == 0.0
         assert (folder / "noisy" / name).read_bytes() == (folder / "again" / name).read_bytes()
     assert read_vehicle("noisy/vehicle.json") == reference_vehicles()["paper"]
+
+
+WALL = {
+    "name": "Over a wall",
+    "kind": "road",
+    "duration": 4,
+    "initial_speed": 20,
+    "road": {"kind": "bump", "begin": 30, "length": 1.0, "height": 0.5},
+}
+
+
+def test_a_campaign_of_a_file_with_sensors_and_road_options(folder, capsys):
+    (folder / "short.json").write_text(json.dumps(SHORT))
+    (folder / "s.toml").write_text('rate_hz = 100\n[sensors."chassis.z"]\nnoise = 0.001\n')
+    options = "--class-factor 0.5 --band 0.03:2.83 --road-seed 9 --date 2026-05-04 --processes 2"
+    command = ["campaign", "--manoeuvre", "short.json", "bump", "--sensors", "s.toml", "-o", "runs"]
+    assert main([*command, *options.split()]) == 0
+    driven = json.loads((folder / "runs" / "manoeuvre_short.manoeuvre.json").read_text())
+    assert driven["road"]["class_factor"] == 0.5
+    assert (driven["road"]["band"], driven["seed"]) == ([0.03, 2.83], 9)
+    run = read_run("runs/manoeuvre_short.csv")
+    assert (run.columns, run.noise) == (["chassis.z"], {"chassis.z": 0.001})
+    assert run.sample_step == pytest.approx(0.01)
+    assert "date = 2026-05-04T00:00:00+00:00" in (folder / "runs/manoeuvre_bump.toml").read_text()
+
+
+def test_a_drive_that_breaks_off_is_named_and_leaves_a_part_beside_the_others(folder, capsys):
+    (folder / "wall.json").write_text(json.dumps(WALL))
+    (folder / "runs").mkdir()
+    (folder / "runs" / "manoeuvre_wall.csv").write_text("an earlier whole one")
+    command = ["campaign", "--manoeuvre", "wall.json", "bump", "-o", "runs", "--force"]
+    message = refused(capsys, *command)
+    assert message.startswith("ridetune: manoeuvre_wall: The simulation diverged at t = 1.4")
+    assert message.endswith("the part before it is kept.")
+    assert not (folder / "runs" / "manoeuvre_wall.csv").exists()
+    assert read_run("runs/manoeuvre_wall.partial.csv").duration < 1.5
+    assert read_run("runs/manoeuvre_bump.csv").duration == pytest.approx(6.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ("--manoeuvre bumb", "did you mean bump?"),
+        ("--manoeuvre bump bump", "bump is named twice"),
+        ("--manoeuvre bump --class-factor 0.5", "None of the manoeuvres has a random road"),
+        ("--class-factor -1", "road.class_factor is -1.0, but must lie between"),
+        ("--band 0.03", "--band 0.03 lacks a colon"),
+        ("--band 3:0.03", "band must rise"),
+        ("--noise n.toml --sensors s.toml", "leave out --noise"),
+        ("--sensors s.toml", "s.toml: sensors.chassis.zz is not known"),
+        ("--sensors gone.toml", "gone.toml: cannot be read"),
+        ("--date yesterday", "--date yesterday: this is no date"),
+        ("--processes 0", "0 processes are asked for"),
+        ("--manoeuvre heave", "heave moves the posts of a rig"),
+    ],
+)
+def test_a_campaign_that_cannot_be_driven_is_refused(folder, capsys, arguments, told):
+    (folder / "n.toml").write_text('[noise]\n"chassis.z" = 0.001\n')
+    (folder / "s.toml").write_text('[sensors."chassis.zz"]\n')
+    assert told in refused(capsys, "campaign", *arguments.split(), "-o", "runs")
+    assert not list(folder.glob("runs/*.csv"))
+
+
+def test_mdf4_without_its_package_says_what_to_install(folder, capsys, monkeypatch):
+    monkeypatch.setattr("ridetune.engine.mdf4.find_spec", lambda name: None)
+    message = refused(capsys, "campaign", "--format", "mf4", "-o", "runs")
+    assert message.endswith("install ridetune[mdf], or take CSV.")
+    assert not list(folder.iterdir())
 
 
 def test_what_a_shell_makes_of_an_unset_variable_is_refused(folder, capsys):

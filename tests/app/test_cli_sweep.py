@@ -12,7 +12,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from pyarrow import feather, parquet
 from ridetune.app.cli import main
-from ridetune.app.commands import sweep as command_module
+from ridetune.app.commands import watch as watch_module
+from ridetune.app.commands.sweep import _line
 from ridetune.engine.designs import LatinHypercube, Sobol
 from ridetune.engine.measurement import read_run, write_run
 from ridetune.engine.metrics import metrics
@@ -148,9 +149,9 @@ def test_what_cannot_be_swept_is_refused_in_one_line_and_leaves_nothing(
 
 
 def test_progress_is_a_line_now_and_then_where_no_terminal_shows_it(capsys, monkeypatch):
-    monkeypatch.setattr(command_module, "TELL_EVERY", 0.0)
-    with command_module._watch() as watch:
-        watch(Progress(50, 1000, 2, 5.0))
+    monkeypatch.setattr(watch_module, "TELL_EVERY", 0.0)
+    with watch_module.watch(_line) as progress:
+        progress(Progress(50, 1000, 2, 5.0))
     told = "50 of 1000 cars, 2 failed, 10 cars/s, 0:01:35 left\n"
     assert capsys.readouterr().err == told
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ridetune.engine.campaign import drive_campaign
+from ridetune.engine.campaign import drive_table_2
 from ridetune.engine.channels import WHEEL_CHANNELS, Run
 from ridetune.engine.fit import Outcome
 from ridetune.engine.identification import Problem, identify
@@ -32,7 +32,7 @@ SPRINGS_AND_DAMPERS = {row.name for row in PARAMETERS if row.symbol in ("K_F", "
 @pytest.fixture(scope="module")
 def campaign():
     """Both manoeuvres of Table 2 driven directly, sampled every 5 ms, without noise."""
-    return drive_campaign(CAR)
+    return drive_table_2(CAR)
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +108,7 @@ def test_errors_of_the_linearised_fit_follow_the_stated_covariance(campaign):
 def test_noisy_outputs_leave_springs_and_dampers_determined():
     """Oracle: the truth within the joint 99.9 % region of the reported errors; the paper's
     campaign determines K and C and, at this noise, not every pivot and bar (Cramer-Rao)."""
-    runs = drive_campaign(CAR, noise=DEFAULT_NOISE, seed=21)
+    runs = drive_table_2(CAR, noise=DEFAULT_NOISE, seed=21)
     fit = identify(Problem.build(CAR, runs, start=ELSEWHERE))
     errors = np.array([one.value - CAR.value(one.name) for one in fit.parameters])
     deviations = np.array([one.std_error for one in fit.parameters])

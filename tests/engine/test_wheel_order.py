@@ -5,7 +5,7 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from ridetune.engine.campaign import drive_campaign
+from ridetune.engine.campaign import drive_table_2
 from ridetune.engine.channels import WHEEL_CHANNELS as WHEELS
 from ridetune.engine.wheel_order import exchanged_wheels, wheel_rises
 from scipy.integrate import cumulative_trapezoid
@@ -21,7 +21,7 @@ SENSOR_NOISE = 0.5e-3
 @pytest.fixture(scope="module")
 def drive():
     """Manoeuvre 2 with noise on the wheels."""
-    [_, run] = drive_campaign(CAR)
+    [_, run] = drive_table_2(CAR)
     rng = np.random.default_rng(4)
     return having(
         run, {name: run[name] + SENSOR_NOISE * rng.normal(size=run.time.size) for name in WHEELS}

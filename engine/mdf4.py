@@ -1,0 +1,57 @@
+"""A run as MDF4 (ASAM), by asammdf, which is an extra: large, LGPL, and slow to import."""
+
+import io
+from collections.abc import Mapping
+from datetime import datetime
+from importlib.util import find_spec
+
+from .channels import Run, channel
+from .errors import MeasurementError
+
+
+def require_asammdf() -> None:
+    """Raise MeasurementError where MDF4 cannot be written for want of a package."""
+    if find_spec("asammdf") is None:
+        raise MeasurementError(
+            "MDF4 needs asammdf, which is not installed; install ridetune[mdf], or take CSV."
+        )
+
+
+def run_to_mdf4(run: Run, facts: Mapping[str, str], date: datetime) -> bytes:
+    """One group of channels in SI, each with its unit, and its meaning and sign as its comment.
+
+    facts : description, vehicle and others, kept in the header;  date : with a time zone
+    """
+    require_asammdf()
+    from asammdf import MDF, Signal
+
+    with MDF(version="4.10") as file:
+        file.start_time = date
+        file.append(
+            [
+                Signal(run[name], run.time, name=name, unit=channel(name).unit, comment=_said(name))
+                for name in run.columns
+            ],
+            acq_name=run.name,
+            common_timebase=True,
+        )
+        header = file.header
+        header.author, header.project = "ridetune", run.name
+        header.subject, header.description = facts["vehicle"], _header(run, facts)
+        stream = io.BytesIO()
+        file.save(stream)
+    return stream.getvalue()
+
+
+def _said(name: str) -> str:
+    info = channel(name)
+    return f"{info.label}; {info.sign}"
+
+
+def _header(run: Run, facts: Mapping[str, str]) -> str:
+    """The facts, one a line, and the noise of each channel."""
+    lines = [f"{name}: {text}" for name, text in facts.items()]
+    lines += [
+        f"noise of {name}: {value:g} {channel(name).unit}" for name, value in run.noise.items()
+    ]
+    return "\n".join(lines)
