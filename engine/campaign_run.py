@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -123,9 +124,10 @@ def _in_processes(
     news, stop = spawn.SimpleQueue(), spawn.Event()
     pool = ProcessPoolExecutor(processes, spawn, _begin, (news, stop))
     try:
-        waiting: set[Future[Recording]] = {
-            pool.submit(_record, campaign, name) for name in campaign.manoeuvres
-        }
+        with _interrupts_later():
+            waiting: set[Future[Recording]] = {
+                pool.submit(_record, campaign, name) for name in campaign.manoeuvres
+            }
         while waiting:
             if cancelled():
                 raise watch.cancelled()
@@ -145,15 +147,26 @@ def _in_processes(
         pool.shutdown(wait=True, cancel_futures=True)
 
 
+@contextmanager
+def _interrupts_later() -> Iterator[None]:
+    """An interrupt waits for the block's end; processes that start meanwhile never see one, since
+    interrupts are their parent's business.
+    """
+    kept = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, kept)
+
+
 _news: Any = None
 _stop: Any = None
 
 
 def _begin(news: Any, stop: Any) -> None:
-    """In a process of its own, first: an interrupt is its parent's business."""
+    """In a process of its own, first."""
     global _news, _stop
     _news, _stop = news, stop
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _record(campaign: Campaign, name: str) -> Recording:

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import urllib.request
 from importlib.metadata import version
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -518,6 +519,27 @@ def test_interrupt_ends_quietly(folder):
             waiting.send_signal(signal.SIGINT)
         assert waiting.wait(timeout=60) == 130
         assert waiting.stderr.read() == ""
+
+
+def test_an_interrupted_campaign_says_what_is_written(folder):
+    """Interrupted with its processes, as a terminal does, while these are still starting."""
+    listening = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    program = [sys.executable, "-c", listening + PROGRAM]
+    options = ["--manoeuvre", "1", "bump", "--processes", "2", "-o", "runs"]
+    command = [*program, "campaign", *options]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as running:
+        for _ in ("vehicle.json", "truth.json"):
+            running.stdout.readline()
+        children = Path(f"/proc/{running.pid}/task/{running.pid}/children")
+        while len(children.read_text().split()) < 3:  # the drives' and the resource tracker
+            pass
+        os.killpg(running.pid, signal.SIGINT)
+        assert running.wait(timeout=60) == 130
+        told = "Interrupted: nothing written whole, manoeuvre_1, manoeuvre_bump not.\n"
+        assert running.stderr.read() == told
+    assert sorted(os.listdir("runs")) == ["truth.json", "vehicle.json"]
 
 
 def test_serve_answers_until_interrupted(folder):
