@@ -16,7 +16,7 @@ from .vehicle_file import vehicle_to_json
 
 def fit_to_json(fit: Fit) -> dict[str, Any]:
     """Everything in a fit but its residual histories."""
-    return _plain(
+    return plain(
         {
             "vehicle": vehicle_to_json(fit.vehicle),
             "parameters": [_parameter(one) for one in fit.parameters],
@@ -57,12 +57,12 @@ def _parameter(one: ParameterEstimate) -> dict[str, Any]:
     return row
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """The value with null for every number that is not finite."""
     if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
+        return {key: plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else None
     return value

@@ -245,7 +245,7 @@ def _compared_runs(
 ) -> tuple[ComparedRun, ...]:
     if not runs:
         raise ProblemError("No run is given; give at least one recording.")
-    names = _distinct_names(runs)
+    names = distinct_names(runs)
     if isinstance(outputs, Mapping):
         strangers = [name for name in outputs if name not in names]
         if strangers:
@@ -314,12 +314,12 @@ def _at_rest(runs: Sequence[ComparedRun]) -> str:
     )
 
 
-def _distinct_names(runs: Sequence[Run]) -> list[str]:
+def distinct_names(runs: Sequence[Run]) -> list[str]:
     """The runs' names, numbered where two runs share one; the same data twice is refused."""
     names: list[str] = []
     for k, run in enumerate(runs):
         for earlier in runs[:k]:
-            if _same_data(run, earlier):
+            if same_data(run, earlier):
                 raise ProblemError(
                     f"Run {run.name} is the same recording as {earlier.name}; list it once."
                 )
@@ -328,7 +328,8 @@ def _distinct_names(runs: Sequence[Run]) -> list[str]:
     return names
 
 
-def _same_data(one: Run, other: Run) -> bool:
+def same_data(one: Run, other: Run) -> bool:
+    """Whether two runs hold the same channels with the same values."""
     return (
         len(one.time) == len(other.time)
         and set(one.channels) == set(other.channels)
