@@ -60,6 +60,7 @@ def command_line() -> "Parser":
     _describe_simulate(add("simulate", _simulate, "Simulate a car on a road, from rims or posts."))
     _describe_sweep(add("sweep", _sweep, "Simulate many cars, one row a car."))
     _describe_identify(add("identify", _identify, "Identify a car's parameters from recordings."))
+    _describe_validate(add("validate", _validate, "Identify a car and report what it predicts."))
     _describe_campaign(add("campaign", _campaign, "Measure a car that is known, as files."))
     _describe_bench(add("bench", _bench, "Measure the engine and its peers on this machine."))
     return parser
@@ -181,6 +182,33 @@ def _describe_sweep(command: Parser) -> None:
 
 
 def _describe_identify(command: Parser) -> None:
+    _add_identification(command)
+    command.add_argument("-o", "--output", metavar="FILE", help="the fit as JSON")
+
+
+def _describe_validate(command: Parser) -> None:
+    _add_identification(command)
+    several = {"nargs": "+", "action": "extend", "default": []}
+    command.add_argument(
+        "--hold-out", metavar="RUN", **several, help="recordings to predict, not fitted"
+    )
+    command.add_argument(
+        "--manoeuvre",
+        metavar="RUN=NAME",
+        **several,
+        help="what was driven: a known one or a file; untold, RUN's own NAME.manoeuvre.json",
+    )
+    command.add_argument(
+        "--geometry", metavar="FILE", help="pivots by geometry, JSON, shown beside the fit's"
+    )
+    command.add_argument("--json", metavar="FILE", help="all results as JSON")
+    command.add_argument(
+        "-o", "--output", metavar="FILE", required=True, help="the report, one HTML file"
+    )
+
+
+def _add_identification(command: Parser) -> None:
+    """Recordings, a car, and what is identified how."""
     command.add_argument("runs", metavar="RUN", nargs="+", help="recording, CSV")
     _add_vehicle(command)
     several = {"nargs": "+", "action": "extend", "default": []}
@@ -191,7 +219,6 @@ def _describe_identify(command: Parser) -> None:
     _add_rims_mode(command, "--braking lap_2.csv=6.2:9.8")
     _add_step(command, "5 ms unless told")
     _add_noise(command, "noise of the recordings")
-    command.add_argument("-o", "--output", metavar="FILE", help="the fit as JSON")
 
 
 def _describe_campaign(command: Parser) -> None:
@@ -323,6 +350,12 @@ def _identify(options: argparse.Namespace) -> None:
     from .commands.identify import identify
 
     identify(options)
+
+
+def _validate(options: argparse.Namespace) -> None:
+    from .commands.validate import validate
+
+    validate(options)
 
 
 def _campaign(options: argparse.Namespace) -> None:

@@ -2,7 +2,7 @@
 
 import { $, debounced, h, tabs } from "./dom.js";
 import { CORNERS, locate } from "./poses.js";
-import { AXIS, COLOURS, decadeLabels, decades } from "./plots.js";
+import { AXIS, COLOURS, decadeLabels, decades, room } from "./plots.js";
 import { density } from "./spectrum.js";
 import { get, on } from "./store.js";
 import { clock, onTime, seek } from "./timeline.js";
@@ -27,9 +27,6 @@ const FREQUENCIES = [0.2, 30];
 const BOTTOM_AXIS = 38;
 const BARE_AXIS = 10;
 const CLICK_PIXELS = 4;
-/** Half the least height of a chart, in display units and as a share: rounding errors are no motion. */
-const LEAST_ROOM = 5e-3;
-const LEAST_SHARE = 1e-3;
 /** Decades of a spectrum that are shown below its peak; deeper ones are rounding errors. */
 const DEPTH = 6;
 
@@ -165,13 +162,6 @@ function options(name, spectrum, labelled) {
     config.hooks.setScale = [(plot, key) => key === "x" && zoomedTo(plot)];
   }
   return config;
-}
-
-/** A little air above and below; a flat line lies in the middle. */
-function room(_, low, high) {
-  if (low === null || high === null) return [-1, 1];
-  const air = Math.max((high - low) * 0.08, LEAST_ROOM, LEAST_SHARE * Math.max(-low, high));
-  return [low - air, high + air];
 }
 
 /** Whole decades around a spectrum. */

@@ -6,14 +6,26 @@ const style = getComputedStyle(document.documentElement);
 export const COLOURS = Object.fromEntries(["measured", "reference", "now"].map((run) =>
   [run, style.getPropertyValue(`--${run}`).trim()]));
 
+const GRID = style.getPropertyValue("--grid").trim();
+
 export const AXIS = {
-  stroke: "#93a0ae",
+  stroke: style.getPropertyValue("--axis").trim(),
   font: "11px system-ui, sans-serif",
-  grid: { stroke: "#2a323c", width: 1 },
-  ticks: { stroke: "#2a323c", width: 1, size: 4 },
+  grid: { stroke: GRID, width: 1 },
+  ticks: { stroke: GRID, width: 1, size: 4 },
 };
 
 const MOST_LINES = 6;
+/** Half the least height of a chart, in display units and as a share: rounding errors are no motion. */
+const LEAST_ROOM = 5e-3;
+const LEAST_SHARE = 1e-3;
+
+/** Range of a chart: a little air above and below; a flat line lies in the middle. */
+export function room(_, low, high) {
+  if (low === null || high === null) return [-1, 1];
+  const air = Math.max((high - low) * 0.08, LEAST_ROOM, LEAST_SHARE * Math.max(-low, high));
+  return [low - air, high + air];
+}
 
 /** Keep a plot as wide as its box for as long as it is on the page. */
 export function fitWidth(plot, box) {

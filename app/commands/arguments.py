@@ -112,26 +112,24 @@ def braking(marks: Iterable[str], paths: Sequence[str]) -> dict[int, tuple[Inter
     marked: dict[int, list[str]] = {}
     for mark in marks:
         name = mark.rpartition("=")[0]
-        marked.setdefault(_place(name, paths, mark), []).append(mark)
+        if not name and len(paths) > 1:
+            raise ArgumentError(f"--braking {mark} names no run of several; write RUN={mark}.")
+        place = place_of(name, paths, f"--braking {mark}") if name else 0
+        marked.setdefault(place, []).append(mark)
     return {place: _intervals(of_run, paths[place]) for place, of_run in marked.items()}
 
 
-def _place(name: str, paths: Sequence[str], mark: str) -> int:
-    """Where in `paths` the run is that a mark of braking names."""
+def place_of(name: str, paths: Sequence[str], argument: str) -> int:
+    """Where in `paths` the run is that an argument names."""
     known = ", ".join(paths)
-    if not name:
-        if len(paths) > 1:
-            raise ArgumentError(f"--braking {mark} names no run of several; write RUN={mark}.")
-        return 0
     if Path(name) in (given := [Path(path) for path in paths]):
         return given.index(Path(name))
     called = [place for place, path in enumerate(given) if path.name == name]
     if not called:
-        raise ArgumentError(f"--braking {mark}: there is no run {name}; there are {known}.")
+        raise ArgumentError(f"{argument}: there is no run {name}; there are {known}.")
     if len(called) > 1:
         raise ArgumentError(
-            f"--braking {mark}: several runs are called {name}; name it by its path, one of"
-            f" {known}."
+            f"{argument}: several runs are called {name}; name it by its path, one of {known}."
         )
     return called[0]
 

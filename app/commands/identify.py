@@ -4,11 +4,14 @@ import json
 import math
 import sys
 from argparse import Namespace
+from collections.abc import Sequence
 
+from ...engine.channels import Run
 from ...engine.fit import Fit, Progress
 from ...engine.fit_file import fit_to_json
 from ...engine.identification import identify as fit_to_runs
 from ...engine.problem import Problem
+from ...engine.vehicle import Vehicle
 from .arguments import bounds, rims_settings, starts
 from .inputs import find_vehicle, read_noise, read_runs, recording_files
 from .output import (
@@ -26,9 +29,19 @@ def identify(options: Namespace) -> None:
     inputs = (options.vehicle, options.noise, *recording_files(options.runs))
     require_place(options.output, inputs)
     noise = read_noise(options.noise)
+    vehicle = find_vehicle(options.vehicle)
+    runs = read_runs(options.runs, options.braking or (), noise=noise)
+    fit = fitted(options, vehicle, runs)
+    print_fit(fit)
+    if options.output:
+        write_file(options.output, json.dumps(fit_to_json(fit), indent=2) + "\n")
+
+
+def fitted(options: Namespace, vehicle: Vehicle, runs: Sequence[Run]) -> Fit:
+    """The fit to some runs that the options describe, with its progress on a terminal."""
     problem = Problem.build(
-        find_vehicle(options.vehicle),
-        read_runs(options.runs, options.braking or (), noise=noise),
+        vehicle,
+        runs,
         options.free or None,
         options.fixed or None,
         bounds=bounds(options.bounds),
@@ -40,9 +53,7 @@ def identify(options: Namespace) -> None:
     fit = fit_to_runs(problem, progress=_show if watched else None)
     if watched:
         print("\r\033[K", end="", file=sys.stderr)
-    _report(fit)
-    if options.output:
-        write_file(options.output, json.dumps(fit_to_json(fit), indent=2) + "\n")
+    return fit
 
 
 def _show(progress: Progress) -> None:
@@ -51,7 +62,8 @@ def _show(progress: Progress) -> None:
     print(f"\r{line}\033[K", end="", file=sys.stderr, flush=True)
 
 
-def _report(fit: Fit) -> None:
+def print_fit(fit: Fit) -> None:
+    """Print parameters, fit percents, outcome and warnings."""
     rows = [("parameter", "value", "± (95 %)", "unit", "determined")]
     for estimate in fit.parameters:
         lower, upper = estimate.confidence_interval

@@ -1,0 +1,134 @@
+"""`ridetune validate`: identify a car on some runs, predict others, report how well."""
+
+import hashlib
+import json
+from argparse import Namespace
+from collections.abc import Sequence
+from pathlib import Path
+
+from ...engine.channels import Run
+from ...engine.errors import VehicleError
+from ...engine.fit_file import fit_to_json
+from ...engine.json_text import read_json
+from ...engine.manoeuvre import Manoeuvre, read_manoeuvre
+from ...engine.validation import (
+    Case,
+    Geometry,
+    Validation,
+    check_cases,
+    geometry_from_json,
+    manoeuvre_beside,
+)
+from ...engine.validation import validate as predict
+from ...engine.validation_file import validation_to_json
+from ..report import made, report
+from .arguments import ArgumentError, place_of, rims_settings
+from .identify import fitted, print_fit
+from .inputs import find_manoeuvre, find_vehicle, read_noise, read_runs, recording_files
+from .output import print_table, print_warnings, require_place, write_file
+
+DRIVEN_BY = {"rims": "rims", "road": "road + torque"}
+MODELS = {"8dof": "8-DOF", "7dof": "7-DOF"}
+
+
+def validate(options: Namespace) -> None:
+    """Fit, predict, print the table of fit percents, write report and results."""
+    paths = [*options.runs, *options.hold_out]
+    _require_places(options, paths)
+    geometry = _geometry(options.geometry)
+    vehicle = find_vehicle(options.vehicle)
+    runs = read_runs(paths, options.braking or (), noise=read_noise(options.noise))
+    cases = _cases(runs, len(options.runs), _manoeuvres(options.manoeuvre, paths))
+    check_cases(cases)
+    fit = fitted(options, vehicle, runs[: len(options.runs)])
+    print_fit(fit)
+    validation = predict(
+        fit.vehicle,
+        cases,
+        traction=options.traction or "exact",
+        settings=rims_settings(options),
+    )
+    print()
+    _print(validation)
+    recordings = [
+        {"name": run.name, "sha256": hashlib.sha256(Path(path).read_bytes()).hexdigest()}
+        for run, path in zip(runs, paths, strict=True)
+    ]
+    document = validation_to_json(validation, fit_to_json(fit), geometry, made(recordings))
+    write_file(options.output, report(document))
+    print(f"Wrote {options.output}: open it in a browser, whose print makes a PDF of it.")
+    if options.json:
+        write_file(options.json, json.dumps(document, allow_nan=False) + "\n")
+        print(f"Wrote {options.json}.")
+
+
+def _require_places(options: Namespace, paths: Sequence[str]) -> None:
+    """Refuse places that cannot be written before the work is done."""
+    beside = [manoeuvre_beside(Path(path)) for path in paths]
+    inputs = (
+        *(options.vehicle, options.noise, options.geometry),
+        *recording_files(paths),
+        *beside,
+        *(text.partition("=")[2] for text in options.manoeuvre),
+    )
+    require_place(options.output, inputs)
+    require_place(options.json, inputs)
+    if options.json and Path(options.json).resolve() == Path(options.output).resolve():
+        raise ArgumentError(f"--json {options.json} and -o name the same file; name two.")
+
+
+def _geometry(path: str | None) -> Geometry | None:
+    if path is None:
+        return None
+    return geometry_from_json(read_json(Path(path), VehicleError), Path(path).name)
+
+
+def _manoeuvres(given: Sequence[str], paths: Sequence[str]) -> dict[int, Manoeuvre]:
+    """What was driven by a run's place in `paths`: as given, else as it lies beside the run."""
+    found: dict[int, Manoeuvre] = {}
+    for text in given:
+        argument = f"--manoeuvre {text}"
+        name, equals, manoeuvre = text.rpartition("=")
+        if not (equals and manoeuvre):
+            raise ArgumentError(f"{argument} names no run or no manoeuvre; write RUN=NAME.")
+        place = place_of(name, paths, argument)
+        if place in found:
+            raise ArgumentError(f"{argument} gives {name} a second one; give it one.")
+        found[place] = find_manoeuvre(manoeuvre)
+    for place, path in enumerate(paths):
+        beside = manoeuvre_beside(Path(path))
+        if place not in found and beside.is_file():
+            found[place] = read_manoeuvre(beside)
+    return found
+
+
+def _cases(runs: Sequence[Run], fits: int, manoeuvres: dict[int, Manoeuvre]) -> list[Case]:
+    return [
+        Case(run, "fit" if place < fits else "hold-out", manoeuvres.get(place))
+        for place, run in enumerate(runs)
+    ]
+
+
+def _print(validation: Validation) -> None:
+    """Print fit percents by run and prediction, the squat, and what was found on the way."""
+    names = list(
+        dict.fromkeys(
+            name for run in validation.runs for one in run.predictions for name in one.scores
+        )
+    )
+    rows = [["predicted, fit percent", "driven by", "model", *names]]
+    for run in validation.runs:
+        for one in run.predictions:
+            scores = [
+                f"{one.scores[name].fit_percent:.1f}" if name in one.scores else "-"
+                for name in names
+            ]
+            what = f"{run.name} ({'fitted' if run.role == 'fit' else 'held out'})"
+            rows.append([what, DRIVEN_BY[one.mode], MODELS[one.model], *scores])
+    print_table(rows, right=range(3, 3 + len(names)))
+    print_warnings(
+        f"{run.name}, {DRIVEN_BY[one.mode]}, {MODELS[one.model]}: {one.failure}"
+        for run in validation.runs
+        for one in run.predictions
+        if one.failure
+    )
