@@ -19,6 +19,7 @@ from . import (
     routes_sessions,
     routes_simulations,
     routes_sweeps,
+    routes_validations,
 )
 from .cluster import Cluster
 from .guard import Guard
@@ -34,6 +35,8 @@ from .settings import Settings
 from .store import Store
 from .sweep_job import KIND as SWEEP
 from .sweep_job import sweep
+from .validation_job import KIND as VALIDATION
+from .validation_job import validation
 from .warmup import WarmUp, ready_to_simulate
 
 log = logging.getLogger(__name__)
@@ -79,6 +82,7 @@ def create_app(
         routes_measurements,
         routes_identifications,
         routes_sweeps,
+        routes_validations,
         routes_page,
     ):
         app.include_router(part.router)
@@ -107,7 +111,11 @@ def _services(
         jobs=Jobs(
             store,
             Cluster(settings.cluster, store.directory.scratch),
-            {IDENTIFICATION: identification(store, recordings), SWEEP: sweep(store, recordings)},
+            {
+                IDENTIFICATION: identification(store, recordings),
+                SWEEP: sweep(store, recordings),
+                VALIDATION: validation(store, recordings),
+            },
             ready=warmup.wait,
         ),
         warmup=warmup,

@@ -178,6 +178,22 @@ class StartValues(WireForm):
     start: Annotated[dict[Name, Number], Field(max_length=50)]
 
 
+class ValidationRequest(WireForm):
+    """Let the car of an identification that is done predict its runs, and others held out.
+
+    manoeuvres : by measurement, what was driven: a known manoeuvre's key or an object
+    braking : by measurement, as of an identification, which tells that of its own runs
+    geometry : {"front": {"distance": m, "angle": rad}, "rear": ...}, one axle or both
+    """
+
+    identification: Name
+    hold_out: Annotated[list[Name], Field(max_length=20)] = []
+    manoeuvres: Annotated[dict[Name, KeyOrObject], Field(max_length=40)] = {}
+    braking: Annotated[dict[Name, Intervals], Field(max_length=40)] = {}
+    geometry: JsonObject | None = None
+    key: Name | None = None
+
+
 class IdentificationRequest(WireForm):
     """Find parameters of the session's car (or of another start) from measurements.
 

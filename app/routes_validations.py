@@ -1,0 +1,73 @@
+"""Validations: background jobs like identifications, whose document and report come as files."""
+
+import json
+from typing import Any
+
+from fastapi.responses import FileResponse, HTMLResponse
+
+from .access import SessionId
+from .errors import Conflict
+from .identification_job import KIND as IDENTIFICATION
+from .job_routes import View, job_router, submitted
+from .report import SERVED_POLICY, report
+from .schemas import ValidationRequest
+from .services import Services, Shared
+from .validation_job import BYTES_A_RUN, KIND, as_asked, check_and_fill
+
+ASKED = ("identification", "runs", "manoeuvres", "braking", "geometry")
+"""What a job shows of its request; `runs` are those fitted and held out, with their `role`."""
+
+VIEW = View(
+    KIND,
+    asked=lambda job: {name: job.spec[name] for name in ASKED},
+    result=lambda job: {"result": job.result},
+)
+
+router = job_router("validations", VIEW)
+
+
+@router.post("", status_code=202)
+async def submit(sid: SessionId, services: Shared, body: ValidationRequest) -> dict[str, Any]:
+    """Queue a validation of an identification; the same `key` again gives the same job."""
+    services.warmup.require()
+    return await services.interactive.run(
+        sid,
+        lambda: submitted(
+            services,
+            sid,
+            VIEW,
+            key=body.key,
+            asked=as_asked(body),
+            spec=lambda: _spec(services, sid, body),
+        ),
+    )
+
+
+def _spec(services: Services, sid: str, body: ValidationRequest) -> dict[str, Any]:
+    """Everything that the job needs, checked."""
+    fitted = services.jobs.get(sid, body.identification, IDENTIFICATION)
+    store, limits = services.store, services.settings.limits
+    spec = check_and_fill(body, sid, fitted, store, services.recordings, limits)
+    store.require_room(sid, BYTES_A_RUN * len(spec["runs"]))
+    return spec
+
+
+@router.get("/{jid}/result.json", response_class=FileResponse)
+def result(sid: SessionId, jid: str, services: Shared) -> FileResponse:
+    """All that the report shows, histories included."""
+    return FileResponse(_document(services, sid, jid), media_type="application/json")
+
+
+@router.get("/{jid}/report.html", response_class=HTMLResponse)
+def as_report(sid: SessionId, jid: str, services: Shared) -> HTMLResponse:
+    """The report, as the command line writes it, in a sandbox of its own."""
+    document = json.loads(_document(services, sid, jid).read_bytes())
+    return HTMLResponse(report(document), headers={"Content-Security-Policy": SERVED_POLICY})
+
+
+def _document(services: Services, sid: str, jid: str) -> Any:
+    job = services.jobs.get(sid, jid, KIND)
+    if job.file is None:
+        remedy = "ask for it again" if job.ended else "wait until it is done"
+        raise Conflict(f"The validation is {job.state} and has no report; {remedy}.")
+    return services.store.directory.original(job.file)

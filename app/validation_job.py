@@ -1,0 +1,147 @@
+"""Validation as a background job: what goes to the worker, what the worker does, what comes back.
+
+The worker gets everything by value and gives the whole document back as a file, so it needs neither
+the database nor the data directory and may be another machine.
+"""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from ..engine.vehicle_file import vehicle_from_json
+from .errors import Conflict, InvalidRequest
+from .identification_job import check_budget
+from .job_store import Job
+from .jobs import Kind, digest
+from .recordings import Recordings, with_braking
+from .schemas import ValidationRequest
+from .settings import Limits
+from .store import Measurement, Store
+from .worker import Report, WithFile
+
+KIND = "validation"
+
+BYTES_A_RUN = 4_000_000
+"""What a run takes in the document, at most: 4001 instants of 40 histories."""
+
+
+def validation(store: Store, recordings: Recordings) -> Kind:
+    """The job kind, bound to where its recordings are kept."""
+
+    def payload(job: Job) -> dict[str, Any]:
+        return {**job.spec, "recordings": _runs(job.spec, job.session, store, recordings)}
+
+    return Kind(task=validate_runs, payload=payload)
+
+
+def as_asked(request: ValidationRequest) -> str:
+    """What stands for a request: the same whenever it is sent."""
+    return digest(request.model_dump(mode="json", exclude={"key"}))
+
+
+def check_and_fill(
+    request: ValidationRequest,
+    session: str,
+    fitted: Job,
+    store: Store,
+    recordings: Recordings,
+    limits: Limits,
+) -> dict[str, Any]:
+    """Everything that the job needs, checked."""
+    from ..engine.manoeuvre import manoeuvre_to_json
+    from ..engine.validation import check_cases, geometry_from_json
+
+    if fitted.result is None:
+        raise Conflict(f"The identification is {fitted.state} and has no fit; wait, or fit again.")
+    held = [store.measurement(session, one) for one in request.hold_out]
+    runs = [{**one, "role": "fit"} for one in fitted.spec["runs"]]
+    runs += [
+        {"id": one.id, "name": one.name, "noise": one.noise, "role": "hold-out"} for one in held
+    ]
+    for field in ("manoeuvres", "braking"):
+        if strangers := set(getattr(request, field)) - {one["id"] for one in runs}:
+            raise InvalidRequest(
+                f"{field} names {min(strangers)}, which is neither fitted nor held out; leave it"
+                " out or add the run.",
+                field=field,
+            )
+    spec = {
+        "identification": fitted.id,
+        "fit": fitted.result,
+        "runs": runs,
+        "braking": {**fitted.spec["braking"], **request.model_dump(mode="json")["braking"]},
+        "manoeuvres": {
+            one: manoeuvre_to_json(_manoeuvre(asked)) for one, asked in request.manoeuvres.items()
+        },
+        "geometry": request.geometry,
+    }
+    if request.geometry is not None:
+        geometry_from_json(request.geometry)
+    kept = [store.measurement(session, one["id"]) for one in runs]
+    check_budget(kept, fitted.result["settings"]["step"], limits)
+    check_cases(_cases(spec, _runs(spec, session, store, recordings)))
+    return {**spec, "recorded": [{"name": one.name, "sha256": one.sha256} for one in kept]}
+
+
+def _manoeuvre(asked: Any) -> Any:
+    from ..engine.manoeuvre import manoeuvre_from_json
+    from .excitation import known_manoeuvre
+
+    return known_manoeuvre(asked) if isinstance(asked, str) else manoeuvre_from_json(asked)
+
+
+def _runs(spec: Mapping[str, Any], session: str, store: Store, recordings: Recordings) -> list[Any]:
+    """The recordings with the noise and the braking that the job states."""
+    found = []
+    for one in spec["runs"]:
+        kept: Measurement = replace(store.measurement(session, one["id"]), noise=one["noise"])
+        found.append(with_braking(recordings.run(kept), spec["braking"].get(one["id"])))
+    return found
+
+
+def _cases(spec: Mapping[str, Any], runs: list[Any]) -> list[Any]:
+    """The engine's cases."""
+    from ..engine.manoeuvre import manoeuvre_from_json
+    from ..engine.validation import Case
+
+    driven = {one: manoeuvre_from_json(data) for one, data in spec["manoeuvres"].items()}
+    return [
+        Case(run, one["role"], driven.get(one["id"]))
+        for one, run in zip(spec["runs"], runs, strict=True)
+    ]
+
+
+def validate_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -> WithFile:
+    """On the worker: predict every run, reporting how far it is; the document as a file."""
+    from ..engine.rims_settings import RimsSettings
+    from ..engine.validation import geometry_from_json, validate
+    from ..engine.validation_file import validation_to_json
+    from .report import made
+
+    fit, geometry = payload["fit"], payload["geometry"]
+    found = validate(
+        vehicle_from_json(fit["vehicle"]),
+        _cases(payload, payload["recordings"]),
+        traction=fit["traction"],
+        settings=RimsSettings(**fit["settings"]),
+        progress=lambda done, of: report({"predictions": done, "of": of}),
+        cancelled=cancelled,
+    )
+    document = validation_to_json(
+        found,
+        fit,
+        None if geometry is None else geometry_from_json(geometry),
+        made(payload["recorded"]),
+    )
+    summary = [
+        {
+            **{name: run[name] for name in ("name", "role", "squat")},
+            "predictions": [
+                {name: value for name, value in one.items() if name != "values"}
+                for one in run["predictions"]
+            ],
+        }
+        for run in document["runs"]
+    ]
+    return WithFile({"runs": summary}, json.dumps(document, allow_nan=False).encode())
