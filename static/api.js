@@ -134,9 +134,21 @@ export const identification = (id) => json("GET", `${base}/identifications/${id}
 export const cancelIdentification = (id) =>
   json("POST", `${base}/identifications/${id}/cancel`);
 
-/** Follow a job: onProgress(progress), onState(job). Returns a function that stops following. */
-export function follow(id, onProgress, onState) {
-  const source = new EventSource(`${base}/identifications/${id}/events`);
+// Validations
+export const validate = (body) => json("POST", `${base}/validations`, { body });
+export const validation = (id) => json("GET", `${base}/validations/${id}`);
+export const validations = () => json("GET", `${base}/validations`);
+export const cancelValidation = (id) => json("POST", `${base}/validations/${id}/cancel`);
+/** What the report shows, as JSON. */
+export const validationDocument = (id) => json("GET", `${base}/validations/${id}/result.json`);
+export const reportUrl = (id) => `${base}/validations/${id}/report.html`;
+
+/**
+ * Follow a job of a kind ("identifications", "validations"): onProgress(progress), onState(job).
+ * Returns a function that stops following.
+ */
+export function follow(kind, id, onProgress, onState) {
+  const source = new EventSource(`${base}/${kind}/${id}/events`);
   source.addEventListener("progress", (event) => onProgress(JSON.parse(event.data)));
   source.addEventListener("state", (event) => {
     const job = JSON.parse(event.data);
@@ -148,9 +160,9 @@ export function follow(id, onProgress, onState) {
     if (source.readyState !== EventSource.CLOSED) return;
     setTimeout(async () => {
       try {
-        const job = await identification(id);
+        const job = await json("GET", `${base}/${kind}/${id}`);
         onState(job);
-        if (!isFinal(job.state)) stop = follow(id, onProgress, onState);
+        if (!isFinal(job.state)) stop = follow(kind, id, onProgress, onState);
       } catch (error) {
         if (error.lost) source.dispatchEvent(new Event("error"));
       }

@@ -56,7 +56,7 @@ export async function resume(jobs) {
   if (!from) return;
   job = await api.identification(from.id);
   view = "fit";
-  if (done && done.id !== from.id) set({ fit: (await api.identification(done.id)).result });
+  if (done && done.id !== from.id) set({ fit: (await api.identification(done.id)).result, fitJob: done });
   if (job.state === "done") await finished();
   else watch(job.id);
   show();
@@ -104,7 +104,7 @@ async function submit() {
 
 function watch(id) {
   unfollow();
-  unfollow = api.follow(id, (progress) => {
+  unfollow = api.follow("identifications", id, (progress) => {
     if (job?.id !== id) return;
     job.progress = progress;
     if (view === "fit") result.advance(job);
@@ -123,7 +123,7 @@ async function finished() {
     refused(error, "Reading the fit");
     return;
   }
-  set({ fit: job.result });
+  set({ fit: job.result, fitJob: job });
   show();
   await scoreHoldouts();
 }

@@ -5,7 +5,7 @@
 //
 // For the browser tests `window.ridetune` looks inside: state(key) of the store, timing (ms from a
 // slider's move to new charts), scene (connected, built, poses, last messages), drawn() (what each
-// chart shows), zoomed(), clock, job(), idle() (no simulation under way) and unsaved().
+// chart shows), zoomed(), clock, job(), validation(), idle() (no simulation under way) and unsaved().
 
 import * as api from "./api.js";
 import * as car from "./car.js";
@@ -22,6 +22,7 @@ import { idle, timing, want } from "./simulation.js";
 import { get, on, set } from "./store.js";
 import * as timeline from "./timeline.js";
 import * as units from "./units.js";
+import * as validation from "./validation.js";
 
 const RETRY = 1500;
 const SAVE_AFTER = 400;
@@ -35,7 +36,7 @@ let saving = false;
 
 async function start() {
   api.useSession(sid);
-  set({ session: sid, online: true, ready: false, compare: "baseline", road: null, liftOff: false, fit: null,
+  set({ session: sid, online: true, ready: false, compare: "baseline", road: null, liftOff: false, fit: null, fitJob: null,
     now: null, reference: null, measured: null, traction: "exact", braking: {} });
   const [session, parameters, channels, vehicles, manoeuvres, roads, rimsSettings] = await Promise.all([
     api.session(), api.parameters(), api.channels(), api.vehicles(), api.manoeuvres(), api.roads(),
@@ -55,6 +56,7 @@ async function start() {
   follow();
   await settle();
   await identification.resume(session.identifications);
+  await validation.resume();
 }
 
 function build() {
@@ -74,6 +76,7 @@ function build() {
   identification.build({
     open: () => select("tab-identification"), apply: applyFit,
   });
+  validation.build();
   car.build();
   scene.build(sid, { askForCar: () => want("scene") });
   splitter();
@@ -243,7 +246,8 @@ function lost(error) {
 
 window.ridetune = {
   state: get, timing, scene: scene.seen, drawn: charts.drawn, zoomed: charts.zoomed,
-  clock: timeline.clock, job: identification.current, idle, unsaved: () => unsaved || saving,
+  clock: timeline.clock, job: identification.current,
+  validation: validation.current, idle, unsaved: () => unsaved || saving,
 };
 
 start().catch(lost);

@@ -17,6 +17,7 @@
 //   now, reference, measured   runs (see api.js) of the ride, or null
 //   trouble      why the last simulation was refused (its `values` with which sliders), or null
 //   fit          the last finished fit (fit.json) or null: the sliders' error bars
+//   fitJob       the identification that found it (its id and runs)
 //   ready        the service has compiled its kernels
 //   online       the service answers
 

@@ -1,0 +1,149 @@
+// Validation: let the fitted car predict its runs and others, follow the job, show what it found.
+
+import * as api from "./api.js";
+import { $, h, inPlace } from "./dom.js";
+import { nameOf } from "./names.js";
+import { refused } from "./notices.js";
+import { brakingOf } from "./preparation.js";
+import { unseen } from "./setup.js";
+import { get, on, set } from "./store.js";
+import { sections } from "./validation_view.js";
+
+/** The role of each run that the fit has not seen, and what was driven, as they were chosen. */
+const left = new Set();
+const driven = {};
+
+let job = null;
+let found = null;
+let starting = false;
+let unfollow = () => {};
+
+export const current = () => job;
+
+/** Build the panel. */
+export function build() {
+  on("fitJob measurements online", show);
+  show();
+}
+
+/** Take up the newest validation of a session that is opened again. */
+export async function resume() {
+  const [newest] = (await api.validations()).sort((a, b) => (a.created < b.created ? 1 : -1));
+  if (!newest) return;
+  job = newest;
+  if (job.state === "done") await finished();
+  else if (!api.isFinal(job.state)) watch(job.id);
+  show();
+}
+
+const busy = () => job !== null && !api.isFinal(job.state);
+
+/** Recordings of the fit, and those that it has not seen. */
+function runs() {
+  const used = new Set(get("fitJob").runs.map(({ id }) => id));
+  const seen = get("measurements").filter(({ id }) => used.has(id));
+  return { seen, others: unseen(seen) };
+}
+
+async function start() {
+  if (starting || busy()) return;
+  starting = true;
+  const { seen, others } = runs();
+  const held = others.filter(({ id }) => !left.has(id)).map(({ id }) => id);
+  const chosen = [...seen.map(({ id }) => id), ...held];
+  try {
+    job = await api.validate({
+      identification: get("fitJob").id,
+      hold_out: held,
+      manoeuvres: Object.fromEntries(chosen.filter((id) => driven[id]).map((id) => [id, driven[id]])),
+      braking: brakingOf(held),
+    });
+    found = null;
+    watch(job.id);
+  } catch (error) {
+    if (error.lost) set({ online: false });
+    refused(error, "Starting the validation");
+  }
+  starting = false;
+  show();
+}
+
+function watch(id) {
+  unfollow();
+  unfollow = api.follow("validations", id, (progress) => {
+    if (job?.id !== id) return;
+    job.progress = progress;
+    show();
+  }, async (state) => {
+    if (job?.id !== id) return;
+    job = { ...job, ...state };
+    if (state.state === "done") await finished();
+    show();
+  });
+}
+
+async function finished() {
+  try {
+    found = await api.validationDocument(job.id);
+  } catch (error) {
+    refused(error, "Reading the validation");
+  }
+}
+
+async function cancel() {
+  try {
+    await api.cancelValidation(job.id);
+  } catch (error) {
+    refused(error, "Cancelling");
+  }
+}
+
+function show() {
+  const panel = $("#validation");
+  inPlace(panel, () => panel.replaceChildren(...content().filter(Boolean)), "#validate, #cancel-validation");
+}
+
+function content() {
+  if (!get("fitJob")) {
+    return [h("p", { className: "empty" },
+      "No fit yet. Identify the car first; then it can be held against runs that it has not seen.")];
+  }
+  const { seen, others } = runs();
+  return [
+    h("ul", { className: "runs" }, seen.map((run) => runRow(run, h("span", { className: "soft" }, "fitted"))),
+      others.map((run) => runRow(run, held(run)))),
+    h("div", { className: "row-tools" },
+      busy() ? h("button", { type: "button", id: "cancel-validation", className: "danger", on: { click: cancel } },
+        "Cancel")
+        : h("button", { type: "button", id: "validate", className: "primary", on: { click: start } }, "Validate"),
+      found ? h("a", { className: "button", id: "report", target: "_blank", rel: "noopener",
+        href: api.reportUrl(job.id) }, "Open report") : null,
+      h("span", { className: "hint", id: "validation-state" }, state())),
+    job?.error ? h("div", { className: "problem", role: "alert" }, h("p", {}, job.error.detail)) : null,
+    ...(found ? sections(found) : []),
+  ];
+}
+
+function state() {
+  if (!job) return "A report for print comes with it.";
+  if (job.state === "running") return `${job.progress?.predictions ?? 0} of ${job.progress?.of ?? "…"} predictions`;
+  return { queued: "Waiting for a worker …", cancelled: "Cancelled", failed: "Failed", done: "" }[job.state];
+}
+
+function runRow(run, role) {
+  const manoeuvres = get("manoeuvres").filter(({ kind }) => kind !== "posts");
+  const choice = h("select", { "aria-label": `Manoeuvre of ${nameOf(run.id)}`,
+    title: "Where the very manoeuvre and road are known, the run is predicted over its road as well",
+    on: { change: () => { driven[run.id] = choice.value; } } },
+  h("option", { value: "" }, "manoeuvre not known"),
+  manoeuvres.map(({ key, name }) => h("option", { value: key, selected: driven[run.id] === key }, name)));
+  return h("li", {}, h("span", { className: "run-name", title: nameOf(run.id) }, nameOf(run.id)),
+    h("span", { className: "run-use" }, role, choice));
+}
+
+function held(run) {
+  const box = h("input", { type: "checkbox", checked: !left.has(run.id),
+    "aria-label": `Hold out ${nameOf(run.id)}`,
+    on: { change: () => (box.checked ? left.delete(run.id) : left.add(run.id)) } });
+  return h("label", { className: "inline" }, box, "hold out");
+}

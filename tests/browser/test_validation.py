@@ -1,0 +1,81 @@
+"""The validation on the page and its report: from a file, from the service, and on paper."""
+
+import re
+
+import pytest
+from ridetune.app.cli import main
+
+from .conftest import SAMPLES
+
+pytestmark = pytest.mark.browser
+
+PRESSED = 120.0
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    """A report by the command line, of a recording whose name is markup."""
+    folder = tmp_path_factory.mktemp("report")
+    name = "<img src=x onerror=alert(1)>.csv"
+    (folder / name).write_bytes((SAMPLES / "paper_twin_1.csv").read_bytes())
+    command = ["validate", str(folder / name), "--vehicle", "paper", "--free", "K_F"]
+    command += ["--hold-out", str(SAMPLES / "paper_twin_2.csv"), "-o", str(folder / "report.html")]
+    command += ["--manoeuvre", "paper_twin_2.csv=2"]
+    assert main(command) == 0
+    return folder / "report.html"
+
+
+def inked(page):
+    """How many of the page's canvases have anything drawn on them."""
+    return page.evaluate(
+        """[...document.querySelectorAll("canvas")].filter((canvas) =>
+        canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data
+            .some((value) => value !== 0)).length"""
+    )
+
+
+def pages(pdf):
+    return len(re.findall(rb"/Type\s*/Page\b", pdf))
+
+
+def test_a_report_opens_from_a_file_and_prints(visit, file):
+    """6 figures of a run on rims alone; 4 more, road and three outputs, where the road is known."""
+    page = visit().page
+    asked = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(file.as_uri())
+    page.wait_for_selector("html[data-drawn=yes]", state="attached")
+    page.wait_for_timeout(300)
+    assert not [url for url in asked if not url.startswith(("file:", "data:"))]
+    figures = page.locator(".figure").count()
+    assert figures == inked(page) == 6 + 10
+    assert page.locator("img").count() == 0
+    assert "onerror" in page.locator("h2", has_text="fitted").first.inner_text()
+    text = page.locator("main").inner_text()
+    for words in ("Identified parameters", "held out", "SHA-256", "8-DOF", "7-DOF"):
+        assert words in text
+    # A first page of tables, then each run from the top of a page on.
+    assert pages(page.pdf(prefer_css_page_size=True)) >= 3
+
+
+def test_the_fitted_car_is_validated_on_the_page(visitor):
+    """The fit's own runs and the sample it has not seen; the report opens in a tab of its own."""
+    visitor.click("#tab-validation")
+    assert "No fit yet" in visitor.element("#validation").inner_text()
+    visitor.click("#identify")
+    visitor.until("ridetune.state('fitJob') !== null", PRESSED)
+    visitor.click("#tab-validation")
+    visitor.click("#validate")
+    visitor.until("ridetune.validation() && ridetune.validation().state === 'done'", PRESSED)
+    visitor.wait(lambda: visitor.element("#report").count() == 1, "a link to the report")
+    visitor.page.wait_for_timeout(300)
+    assert visitor.element("#validation .figure").count() >= 12
+    assert visitor.element("#validation .validation-scores tbody").count() == 2
+    with visitor.page.context.expect_page() as opened:
+        visitor.click("#report")
+    report = opened.value
+    complaints = []
+    report.on("console", lambda said: complaints.append(said.text))
+    report.wait_for_selector("html[data-drawn=yes]", state="attached")
+    assert report.locator(".figure").count() == inked(report)
+    assert complaints == []
