@@ -65,7 +65,7 @@ class RecordReader:
             return self._one_of(arguments, data, path, accepted)
         if is_dataclass(hint):
             return self.record(hint, data, path)
-        if origin is tuple and isinstance(data, Sequence) and not isinstance(data, str):
+        if origin is tuple and _fits(hint, data):
             return self._items(arguments, data, path, accepted)
         if not _fits(hint, data):
             wanted = expected(hint, accepted)
@@ -164,6 +164,8 @@ def _fits(hint: Any, data: Any) -> bool:
         return isinstance(data, Mapping)
     if get_origin(hint) is Literal:
         return isinstance(data, str) and data in get_args(hint)
+    if get_origin(hint) is tuple:
+        return isinstance(data, Sequence) and not isinstance(data, str)
     if hint in (float, int):
         whole = (
             hint is float or isinstance(data, int) or (isinstance(data, float) and data % 1 == 0)

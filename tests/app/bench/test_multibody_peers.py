@@ -1,13 +1,13 @@
 """Other multibody programs, with force elements of their own, drive the car where we do."""
 
 import tomllib
-from importlib import import_module
 from math import log2
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from ridetune.app.bench.exudyn_peer import ExudynCar
 from ridetune.app.bench.histories import histories
 from ridetune.app.bench.modes import relative_error
 from ridetune.app.bench.mujoco_peer import MujocoCar
@@ -26,8 +26,7 @@ def by_mujoco(integrator):
 
 
 def by_exudyn(*what):
-    pytest.importorskip("exudyn")
-    return import_module("ridetune.app.bench.exudyn_peer").ExudynCar(*what).states()
+    return ExudynCar(*what).states()
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -61,8 +60,8 @@ def test_they_converge_to_our_converged_run(seed, states_of, order):
 
 
 def test_what_a_missing_peer_asks_for_is_what_the_project_names():
-    """Oracle: the extras of pyproject.toml, and the tests' own MuJoCo."""
+    """Oracle: the extras of pyproject.toml, and what the tests run on."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())
     extras = project["project"]["optional-dependencies"]
-    assert sorted(INSTALL.values()) == sorted(extras["bench"] + extras["bench-exudyn"])
-    assert set(extras["bench"]) <= set(project["dependency-groups"]["test"])
+    assert sorted(INSTALL.values()) == sorted(extras["bench"] + extras["detailed"])
+    assert set(extras["bench"] + extras["detailed"]) <= set(project["dependency-groups"]["test"])

@@ -1,0 +1,28 @@
+"""The one place that imports Exudyn, when it is first needed."""
+
+import sys
+from contextlib import redirect_stdout
+from importlib import import_module
+from importlib.util import find_spec
+from io import StringIO
+from typing import Any
+
+from ..errors import SimulationError
+
+INSTALL = 'pip install "ridetune[detailed]"'
+
+
+def require_exudyn() -> tuple[Any, Any]:
+    """The modules exudyn and exudyn.itemInterface, without what they print.
+
+    Exudyn's fast build is asked for, which checks no ranges. Raises SimulationError with the way
+    to install it where it is missing.
+    """
+    if find_spec("exudyn") is None:
+        raise SimulationError(f"The detailed car is solved by Exudyn; install it: {INSTALL}")
+    if "exudyn" not in sys.modules:
+        sys.exudynFast = True  # pyright: ignore[reportAttributeAccessIssue]  # read by the import
+    with redirect_stdout(StringIO()):
+        exudyn, items = import_module("exudyn"), import_module("exudyn.itemInterface")
+    exudyn.config.printToConsole = False
+    return exudyn, items

@@ -1,0 +1,102 @@
+"""What a run of the detailed car keeps, and the project's channels read from it."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..channels import Run
+from .builder import Model
+from .pose import point, point_acceleration, point_velocity, rotation, spin
+
+Array = NDArray[np.float64]
+
+
+class WheelSample(NamedTuple):
+    """What acts at the four wheels in the order of the car's wheels, each (4,).
+
+    load : tyre load, N;  road : height under the wheel, m;  torque : drive torque, N m
+    """
+
+    load: Array
+    road: Array
+    torque: Array
+
+
+class Histories:
+    """States of every rigid group at the sample times.
+
+    samples : how many at most;  sample_step : s
+    """
+
+    def __init__(self, model: Model, samples: int, sample_step: float):
+        self._model = model
+        self._step = sample_step
+        self._design = model.design
+        self._q, self._qd, self._qdd = (np.zeros((samples, len(model.groups), 6)) for _ in range(3))
+        self._wheels = np.zeros((samples, 3, 4))
+        self.count = 0
+
+    def keep(self, wheels: WheelSample) -> None:
+        """Add the model's present state."""
+        data = self._model.system.systemData
+        k = self.count
+        self._q[k] = data.GetODE2Coordinates().reshape(-1, 6) + self._design
+        self._qd[k] = data.GetODE2Coordinates_t().reshape(-1, 6)
+        self._qdd[k] = data.GetODE2Coordinates_tt().reshape(-1, 6)
+        self._wheels[k] = wheels
+        self.count += 1
+
+    def farthest_astray(self) -> tuple[str, float]:
+        """The body farthest from its place in the car at the last sample, and how far, m."""
+        q, home = self._q[self.count - 1], self._design[:, :3]
+        chassis = self._model.chassis
+        away = home - home[chassis]
+        expected = q[chassis, :3] + away @ rotation(q[chassis, 3:]).T
+        distance = np.linalg.norm(q[:, :3] - expected, axis=1)
+        distance = np.where(np.isfinite(distance), distance, np.inf)
+        worst = int(np.argmax(distance))
+        return self._model.groups[worst].names[0], float(distance[worst])
+
+    def run(self, name: str) -> Run:
+        """The channels so far, displacements from rest, which is the first sample."""
+        kept = slice(0, self.count)
+        q, qd, qdd = self._q[kept], self._qd[kept], self._qdd[kept]
+        channels = self._chassis(q, qd, qdd)
+        model = self._model
+        for k, wheel in enumerate(model.car.wheels):
+            corner, group = wheel.corner, model.wheels[k]
+            centre = point(q[:, group], model.in_body(wheel.body, wheel.centre))
+            channels[f"wheel.{corner}.z"] = centre[:, 2] - centre[0, 2]
+            for row, kind in enumerate(("tyre.{}.load", "road.{}.z", "drive.{}.torque")):
+                channels[kind.format(corner)] = self._wheels[kept, row, k]
+        for line in model.car.dampers:
+            ends = [
+                point(q[:, model.index[body]], model.in_body(body, end))
+                for body, end in zip(line.bodies, line.ends, strict=True)
+            ]
+            length = np.linalg.norm(ends[0] - ends[1], axis=1)
+            channels[f"suspension.{line.corner}.travel"] = length[0] - length
+        return Run(name, self._step * np.arange(self.count, dtype=np.float64), channels)
+
+    def _chassis(self, q: Array, qd: Array, qdd: Array) -> dict[str, Array]:
+        """Motion of the measured point and attitude of the chassis."""
+        model, k = self._model, self._model.chassis
+        offset = model.in_body(model.car.chassis, model.car.measured_point)
+        q, qd, qdd = q[:, k], qd[:, k], qdd[:, k]
+        place, velocity = point(q, offset), point_velocity(q, qd, offset)
+        turn, rates = rotation(q[:, 3:]), spin(q[:, 3:], qd[:, 3:])
+        pitch = -np.arcsin(turn[:, 2, 0])
+        roll = np.arctan2(turn[:, 2, 1], turn[:, 2, 2])
+        # From R = Rz(yaw) Ry(pitch) Rx(roll), yaw small: w = yaw' z + pitch' y + roll' x.
+        return {
+            "chassis.x": place[:, 0] - place[0, 0],
+            "chassis.z": place[:, 2] - place[0, 2],
+            "chassis.pitch": pitch - pitch[0],
+            "chassis.roll": roll - roll[0],
+            "chassis.v_x": velocity[:, 0],
+            "chassis.z_rate": velocity[:, 2],
+            "chassis.pitch_rate": rates[:, 1],
+            "chassis.roll_rate": rates[:, 0],
+            "chassis.a_x": point_acceleration(q, qd, qdd, offset)[:, 0],
+        }
