@@ -99,8 +99,8 @@ class Model:
         (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia
         body = self.system.AddObject(
             self.items.ObjectRigidBody(
-                physicsMass=group.mass,
-                physicsInertia=[xx, yy, zz, yz, xz, xy],
+                mass=group.mass,
+                inertia=[xx, yy, zz, yz, xz, xy],
                 nodeNumber=node,
             )
         )

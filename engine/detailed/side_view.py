@@ -33,7 +33,7 @@ INCREMENT = 2e-3
 SMALL_STEP = 5e-3
 """Greatest step of the road, m; the tyres are squeezed by thrice as much."""
 
-LOCKED = 0.02
+LOCKED = 0.2
 """Least rise of the wheel centre for a rise of the road: below it the suspension is locked."""
 
 
