@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .equilibrium import StaticLoads, loads_at_rest, stands, static_loads
 from .frames import CORNERS, axle_of, side_of
 from .frames import Corner as CornerName
-from .kernels.buffer import CAR_ROWS
+from .kernels.buffer import BODY_ROWS, CAR_ROWS, CORNER_ROWS
 from .kernels.records import Body, Corner
 from .vehicle import Vehicle, possible
 
@@ -61,6 +61,7 @@ def corner_record(
     wheel_x = axle.cg_distance if front else -axle.cg_distance
     arm_x, arm_z = -inwards * pivot.distance, wheel.radius - pivot.distance * np.tan(pivot.angle)
     offset_x, offset_y, offset_z = wheel.cg_offset
+    jounce_damping, rebound_damping = suspension.slopes
     brakes = vehicle.brakes
     front_share = brakes.front_share if brakes else 0.0
     driven = vehicle.driven_corners
@@ -81,7 +82,9 @@ def corner_record(
         mount_z=arm_z + suspension.mount_height,
         preload=loads.preload[corner],
         stiffness=suspension.stiffness,
-        damping=suspension.damping,
+        jounce_damping=jounce_damping,
+        rebound_damping=rebound_damping,
+        per_knee=0.0 if suspension.knee_speed is None else 1.0 / suspension.knee_speed,
         rest_length=suspension.mount_height,
         static_load=loads.tyre_load[corner],
         tyre_stiffness=tyre.stiffness,
@@ -125,6 +128,18 @@ def car_rows(
             loads = loads_at_rest(cars)
             _write(rows[some], cars, loads, lift_off)
             rows[some][~(possible(cars) & stands(loads))] = np.nan
+    return rows
+
+
+def with_steepest_dampers(cars: Array) -> Array:
+    """Rows (C, CAR_ROWS) of the same cars with linear dampers, each as steep as it ever was."""
+    rows = cars.copy()
+    jounce, rebound, per_knee = (
+        BODY_ROWS + Corner._fields.index(name) + CORNER_ROWS * np.arange(len(CORNERS))
+        for name in ("jounce_damping", "rebound_damping", "per_knee")
+    )
+    rows[:, jounce] = rows[:, rebound] = np.maximum(cars[:, jounce], cars[:, rebound])
+    rows[:, per_knee] = 0.0
     return rows
 
 

@@ -18,7 +18,7 @@ from .channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
 from .demand import Demand, PiecewiseLinear, PostMotion
 from .errors import SimulationDiverged, SimulationError
 from .filters import smoothed
-from .frames import CORNERS
+from .frames import AXLES, CORNERS
 from .initial_state import swings_in
 from .integration import check_sound, free_outputs, free_states, rims_outputs, rims_states
 from .manoeuvre import Manoeuvre
@@ -161,6 +161,7 @@ def simulate_rims(
             initial_state=settings.initial_state != untold.initial_state,
             step=settings.step != untold.step,
         )
+        ignored += _straightened(vehicle)
         heights = np.column_stack([run[name] for name in WHEEL_CHANNELS])
         heights = smoothed(run.time, heights, settings.rim_cutoff_hz)
         result = replace(baseline.simulate_rims(vehicle, run.time, heights, points), name=run.name)
@@ -224,7 +225,10 @@ def _free(
             result,
             _load_shares(result),
             inputs.steps.size,
-            warnings=_ignored(lift_off=lift_off, step=step != FREE_STEP),
+            warnings=(
+                *_ignored(lift_off=lift_off, step=step != FREE_STEP),
+                *_straightened(vehicle),
+            ),
         )
     car = car_row(vehicle, lift_off)
     check_free_step(car, demand.brake.values.max(axis=0), float(inputs.steps.max()))
@@ -290,6 +294,17 @@ def _rims_run(vehicle: Vehicle, inputs: RimsInputs, traction: Traction, points: 
         }
         channels |= {name: smooth[:, k] for k, name in enumerate(OUTPUT_CHANNELS)}
     return Run(inputs.name, inputs.time, channels)
+
+
+def _straightened(vehicle: Vehicle) -> tuple[str, ...]:
+    """A warning on axles whose dampers the 7-DOF model takes for linear."""
+    bent = [name for name in AXLES if not vehicle.axle(name).suspension.linear]
+    if not bent:
+        return ()
+    return (
+        f"The 7-DOF model is linear: {' and '.join(bent)} suspension.damping counts in jounce and"
+        " rebound at every speed; rebound_ratio and knee_speed are ignored.",
+    )
 
 
 def _ignored(**told: bool) -> tuple[str, ...]:

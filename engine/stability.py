@@ -8,7 +8,8 @@ solution that belongs to the eigenvalue s of J by
 Where |R| > 1 for a motion that decays, the result is nonsense and need not look like it. On the
 negative real axis (stiff dampers, brakes near standstill) that is beyond h |s| = 2.785, on the
 imaginary axis (wheel hop) beyond 2.828. J is the Jacobian of the equations of motion in the design
-position at rest, where the tanh(v/v0) of rolling resistance and brakes is steepest.
+position at rest, where the tanh(v/v0) of rolling resistance and brakes is steepest; a damper counts
+with the steeper of its slopes in jounce and rebound.
 """
 
 from collections.abc import Callable
@@ -17,7 +18,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from .car_rows import AT_ONCE
+from .car_rows import AT_ONCE, with_steepest_dampers
 from .errors import SimulationError
 from .integration import ARM_ACCELERATIONS, free_outputs, rims_outputs
 from .road import Road
@@ -74,12 +75,12 @@ def stable_on_road(cars: Array, brake: Array, step: float) -> NDArray[np.bool_]:
 
 def road_eigenvalues(cars: Array, brake: Array) -> NDArray[np.complex128]:
     """Eigenvalues (C, 16), 1/s, of many cars on a road or a rig; brake (4,) or (C, 4)."""
-    brakes = np.broadcast_to(brake, (len(cars), 4))
+    steepest, brakes = with_steepest_dampers(cars), np.broadcast_to(brake, (len(cars), 4))
 
     def accelerations(q: Array, rates: Array) -> Array:
         states, acting = np.hstack([q, rates]), np.zeros((len(q), 16))
         found = np.empty((len(cars), len(q), 8))
-        for car, braked, values in zip(cars, brakes, found, strict=True):
+        for car, braked, values in zip(steepest, brakes, found, strict=True):
             acting[:, 12:] = braked
             out = free_outputs(car, states, acting, Road.flat())
             values[:, :4], values[:, 4:] = out[:, :4], out[:, ARM_ACCELERATIONS]
@@ -108,13 +109,14 @@ def stable_on_rims(cars: Array, step: float) -> NDArray[np.bool_]:
 
 def rims_eigenvalues(cars: Array) -> NDArray[np.complex128]:
     """Eigenvalues (C, 6), 1/s, of many cars on their rims."""
+    steepest = with_steepest_dampers(cars)
 
     def accelerations(q: Array, rates: Array) -> Array:
         states = np.zeros((len(q), 16))
         states[:, 1:4], states[:, 9:12] = q, rates
         still = np.zeros((len(q), 15))
         found = np.empty((len(cars), len(q), 3))
-        for car, values in zip(cars, found, strict=True):
+        for car, values in zip(steepest, found, strict=True):
             values[:] = rims_outputs(car, states, still, True)[:, 1:4]
         return found
 

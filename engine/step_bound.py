@@ -19,8 +19,9 @@ and for all elements together, by (a + b)^2 <= (1 + t) a^2 + (1 + 1/t) b^2 with 
 
     sum k |g . q|^2 <= P + R,   P = greatest of any corner's sum k u,   R = sum k w of all corners
 
-Springs feel g_a = s_x, tyres the wheel centre's rise (1, -X, Y) and -s_x, dampers of both likewise;
-a bar feels two arms, at most 2 k / M_i of each. What the constant forces at rest add to K is
+Springs feel g_a = s_x, tyres the wheel centre's rise (1, -X, Y) and -s_x, dampers of both likewise,
+those of the suspension with the steeper of their slopes; a bar feels two arms, at most 2 k / M_i of
+each. What the constant forces at rest add to K is
 
     sum over corners of (W0 (r_w - h) - m g C_z) (p^2 + r^2) + 2 B_i p a_i + (B_i - F_i) a_i^2
     B_i = W0 s_z - m g p_z,   F_i = F0 (s_z + s_z^2 / L0)
@@ -73,7 +74,10 @@ class _Linearised:
         """(|c| + sqrt(|c|^2 + 4 |k|)) / 2."""
         body, corner = self.body, self.corner
         damping = self._pushed_along() + self._felt(
-            corner.damping, corner.tyre_damping, body.front_bar_damping, body.rear_bar_damping
+            np.maximum(corner.jounce_damping, corner.rebound_damping),
+            corner.tyre_damping,
+            body.front_bar_damping,
+            body.rear_bar_damping,
         )
         stiffness = self._felt(
             corner.stiffness,

@@ -111,11 +111,30 @@ class Wheel:
 
 @dataclass(frozen=True, slots=True)
 class Suspension:
-    """Spring-damper from the wheel centre to a mount `mount_height` straight above it at rest."""
+    """Spring-damper from the wheel centre to a mount `mount_height` straight above it at rest.
+
+    damping : of the damper near rest, the mean of its slopes in jounce and in rebound
+    rebound_ratio : its slope in rebound over that in jounce
+    knee_speed : at which its force has fallen to half of what the slope promises; None where the
+        slope holds at every speed
+    """
 
     stiffness: Annotated[float, Range("N/m", 100.0, 1e7)]
     damping: LinearDamping
     mount_height: Annotated[float, Range("m", 0.02, 5.0)] = 0.40
+    rebound_ratio: Annotated[float, Range("1", 0.05, 20.0)] = 1.0
+    knee_speed: Annotated[float, Range("m/s", 0.01, 100.0)] | None = None
+
+    @property
+    def linear(self) -> bool:
+        """Whether the damper's force is its damping times the jounce rate."""
+        return self.rebound_ratio == 1.0 and self.knee_speed is None
+
+    @property
+    def slopes(self) -> tuple[float, float]:
+        """Of the damper's force near rest, in jounce and in rebound, N s/m."""
+        jounce = 2.0 * self.damping / (1.0 + self.rebound_ratio)
+        return jounce, self.rebound_ratio * jounce
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,7 +228,7 @@ class Vehicle:
         return self.axle(axle_of(corner))
 
     def value(self, path: str) -> float:
-        """The number at a dotted path, e.g. `front.pivot.angle`."""
+        """The number at a dotted path, e.g. `front.pivot.angle`; None for one the car lacks."""
         _require_number(self, path)
         record: Any = self
         for name in path.split("."):
@@ -284,6 +303,8 @@ def _ranged(record: Any, prefix: str = "") -> Iterator[tuple[str, float, Range]]
     """Every number of a record with its dotted path and accepted range."""
     for name, (_, accepted) in field_types(type(record)).items():
         path, value = prefix + name, getattr(record, name)
+        if value is None:
+            continue
         if accepted is None:
             if is_dataclass(value):
                 yield from _ranged(value, f"{path}.")

@@ -5,7 +5,7 @@ real cars: any drive, hub motors, inboard brakes, product of inertia, offset cen
 pivots outside the wheelbase.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from ridetune.engine.vehicle import (
@@ -96,6 +96,22 @@ def random_vehicle(rng, *, braked=None, outside=0.15, offsets=True):
     )
     check(vehicle)
     return vehicle
+
+
+def with_random_dampers(vehicle, rng):
+    """The car with two-slope dampers, each axle with a knee or without."""
+    axles = {
+        name: replace(
+            axle,
+            suspension=replace(
+                axle.suspension,
+                rebound_ratio=rng.uniform(0.3, 4.0),
+                knee_speed=rng.choice([None, rng.uniform(0.05, 2.0)]),
+            ),
+        )
+        for name, axle in (("front", vehicle.front), ("rear", vehicle.rear))
+    }
+    return replace(vehicle, **axles)
 
 
 def mirrored(values):

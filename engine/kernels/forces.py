@@ -31,20 +31,30 @@ def direction_of_travel(x_rate):
 
 
 @inlined
+def damper_slope(corner, jounce_rate):
+    """Force of a damper over the rate j at which it shortens, N s/m (eq. 9 of docs/model.md).
+
+    That of a linear damper is its damping, to the last bit.
+    """
+    slope = corner.jounce_damping if jounce_rate > 0.0 else corner.rebound_damping
+    return slope / (1.0 + abs(jounce_rate) * corner.per_knee)
+
+
+@inlined
 def strut(corner, p, arm):
     """Spring-damper between the wheel centre p (from the pivot, B) and the mount.
 
-    F = F0 + K (L0 - L) - C dL/dt on the mount along the element, minus that on the wheel
+    F = F0 + K (L0 - L) + D j, j = -dL/dt, on the mount along the element, minus that on the wheel
     (eq. 9 of docs/model.md). Only the arm's rotation changes L.
     """
     x, z = corner.mount_x - p[0], corner.mount_z - p[2]
     length = sqrt(x * x + z * z)
     axis_x, axis_z = x / length, z / length
     lever = axis_x * p[2] - axis_z * p[0]
-    length_rate = -arm.rate * lever
+    jounce_rate = arm.rate * lever
     travel = corner.rest_length - length
     spring = corner.preload + corner.stiffness * travel
-    damper = -corner.damping * length_rate
+    damper = damper_slope(corner, jounce_rate) * jounce_rate
     moment = -(spring + damper) * lever
     return Strut(travel, spring, damper, axis_x, axis_z, moment, z)
 

@@ -44,7 +44,12 @@ class Corner(NamedTuple):
     mount_z: float
     preload: float
     stiffness: float
-    damping: float
+    jounce_damping: float
+    """Slope of the damper's force near rest where the element shortens, N s/m."""
+    rebound_damping: float
+    """The same where it lengthens."""
+    per_knee: float
+    """One over the speed of the damper's knee, s/m; 0 without one."""
     rest_length: float
     static_load: float
     tyre_stiffness: float

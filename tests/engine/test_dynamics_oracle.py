@@ -16,6 +16,7 @@ from ..factories import (
     random_rims_state,
     random_road_state,
     random_vehicle,
+    with_random_dampers,
 )
 from ..oracles.mujoco_car import MujocoCar
 from ..single_state import accelerations, rims_accelerations
@@ -104,6 +105,22 @@ def test_rims_accelerations_mirror_left_and_right(seed, traction):
     within_round_off(mirrored_coordinates(there["qdd"]), here["qdd"])
     within_round_off(mirrored(there["vertical_force"]), here["vertical_force"])
     within_round_off(mirrored(there["longitudinal_force"]), here["longitudinal_force"])
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_two_slope_dampers_are_those_of_the_multibody_program_in_both_modes(seed):
+    """Oracle: the law written out by hand; and the mirror, where left and right change places."""
+    rng = np.random.default_rng([6, seed])
+    vehicle = with_random_dampers(random_vehicle(rng), rng)
+    road, rims = random_road_state(rng, vehicle), random_rims_state(rng, vehicle)
+    car = MujocoCar(vehicle)
+    free = accelerations(vehicle, road.q, road.qd, **road.inputs)
+    within_round_off(free, car.accelerations(road.q, road.qd, **road.inputs))
+    other = road.mirror()
+    there = accelerations(vehicle, other.q, other.qd, **other.inputs)
+    within_round_off(mirrored_coordinates(there), free)
+    expected, *_ = car.rims_accelerations(*rims.arguments)
+    within_round_off(rims_accelerations(vehicle, *rims.arguments)["qdd"], expected)
 
 
 def cars_at_rest():

@@ -27,9 +27,18 @@ class MujocoCar(CarTree):
         J = self.point_jacobian(p_A, "chassis") - self.point_jacobian(p_C, CORNERS[i])
         length = np.linalg.norm(p_A - p_C)
         along = (p_A - p_C) / length
-        damper = -data.damping * along @ J @ qd
+        damper = self.damper_force(data, -along @ J @ qd)
         spring = self.corners[i].preload + data.stiffness * (data.mount_height - length)
         return length, (spring + damper) * along, damper
+
+    @staticmethod
+    def damper_force(data, jounce_rate):
+        """Force of a damper at a jounce rate; C is the mean of both slopes, N."""
+        slopes = np.array([1.0, data.rebound_ratio]) * 2 * data.damping / (1 + data.rebound_ratio)
+        force = slopes[0] * max(jounce_rate, 0.0) + slopes[1] * min(jounce_rate, 0.0)
+        return (
+            force if data.knee_speed is None else force / (1 + abs(jounce_rate) / data.knee_speed)
+        )
 
     def suspension_forces(self, q, qd):
         """Generalized forces (8,) of springs, dampers and stabilizer bars."""
