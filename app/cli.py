@@ -214,6 +214,11 @@ def _add_identification(command: Parser) -> None:
     several = {"nargs": "+", "action": "extend", "default": []}
     command.add_argument("--free", metavar="NAME", **several, help="identify these alone")
     command.add_argument("--fixed", metavar="NAME", **several, help="identify all but these")
+    command.add_argument(
+        "--damper",
+        choices=("linear", "two-slope"),
+        help="two-slope: identify rebound ratios and knee speeds, too",
+    )
     command.add_argument("--bounds", metavar="NAME=LOW:HIGH", **several, help="SI units")
     command.add_argument("--start", metavar="NAME=VALUE", **several, help="SI units")
     _add_rims_mode(command, "--braking lap_2.csv=6.2:9.8")

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..engine.channels import Run
-from ..engine.parameters import PARAMETER_NAMES, parameter
+from ..engine.parameters import ALL_NAMES, PARAMETER_NAMES, parameter
 from .errors import OverBudget
 from .job_store import Job
 from .jobs import Kind, digest
@@ -55,7 +55,7 @@ def filled_in(spec: Mapping[str, Any], problem: Any) -> dict[str, Any]:
         "free": free,
         "fixed": [name for name in PARAMETER_NAMES if name not in free],
         "bounds": {one.name: [one.lower, one.upper] for one in problem.free},
-        "start": {name: problem.vehicle.value(name) for name in PARAMETER_NAMES if name in started},
+        "start": {name: problem.vehicle.value(name) for name in ALL_NAMES if name in started},
     }
 
 

@@ -12,7 +12,14 @@ from fastapi import APIRouter
 
 from ..engine.channels import CHANNELS
 from ..engine.errors import ParameterError
-from ..engine.parameters import PARAMETERS, bounds_rule, default_bounds, parameter
+from ..engine.parameters import (
+    ALL_PARAMETERS,
+    DAMPER_NAMES,
+    DAMPER_STARTS,
+    bounds_rule,
+    default_bounds,
+    parameter,
+)
 from ..engine.run_notes import DEFAULT_NOISE
 from ..engine.vehicle import numbers
 from ..engine.vehicle_file import reference_vehicles, vehicle_to_json
@@ -25,10 +32,20 @@ router = APIRouter(prefix="/api", tags=["catalogue"], route_class=StrictRoute)
 
 @router.get("/parameters")
 def parameters() -> list[dict[str, Any]]:
-    """The twelve parameters of an identification, their sliders and what is accepted, SI."""
+    """The parameters of an identification, their sliders and what is accepted, SI.
+
+    linear_start : of those that a car with linear dampers lacks, where a search begins; else null
+    """
     return [
-        {**asdict(row), **_accepted(row.name), "bounds_rule": bounds_rule(row.name)}
-        for row in PARAMETERS
+        {
+            **asdict(row),
+            **_accepted(row.name),
+            "bounds_rule": bounds_rule(row.name),
+            "linear_start": DAMPER_STARTS[row.name.rpartition(".")[2]]
+            if row.name in DAMPER_NAMES
+            else None,
+        }
+        for row in ALL_PARAMETERS
     ]
 
 

@@ -209,6 +209,11 @@ def undetermined_findings(estimates: Sequence[ParameterEstimate], errors: Uncert
 def _at_bound(one: ParameterEstimate) -> str:
     at_lower = one.value - one.lower < one.upper - one.value
     side, bound = ("lower", one.lower) if at_lower else ("upper", one.upper)
+    if one.name.endswith("knee_speed") and not at_lower:
+        return (
+            f"{one.name} is at its upper bound, {bound:.4g} {one.unit}: the runs show no knee, as"
+            " if the damper kept its slopes at every speed; fix it or add a rougher run."
+        )
     return (
         f"{one.name} is at its {side} bound, {bound:.4g} {one.unit}; widen the bound or fix the "
         "parameter."

@@ -1,16 +1,18 @@
-"""The twelve parameters an identification can free, in the order of the paper's Table 3.
+"""The parameters an identification can free: the twelve of the paper's Table 3 in its order, then
+the four of dampers with two slopes and a knee, which stay as they are unless they are named.
 
 One row a parameter: its path in the vehicle's JSON, its symbol and label, how a page shows it and
 how far a slider goes. Bounds of a fit, sliders, JSON and documentation all read this table.
 """
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from difflib import get_close_matches
 
 from .errors import ParameterError
-from .frames import AxleName
-from .vehicle import numbers
+from .frames import AXLES, AxleName
+from .vehicle import Vehicle, numbers
 
 SHARE_OF_START = (0.05, 8.0)
 """Default bounds of a stiffness or damping, as multiples of its start value."""
@@ -20,6 +22,15 @@ ANGLE_BOUNDS = (-0.3, 1.3)
 
 DISTANCE_BOUNDS = (0.1, 10.0)
 """Default bounds of a pivot distance's magnitude, m; its sign is that of the start value."""
+
+RATIO_BOUNDS = (0.2, 10.0)
+"""Default bounds of a damper's rebound ratio."""
+
+KNEE_BOUNDS = (0.02, 20.0)
+"""Default bounds of a damper's knee speed, m/s: from hardly above friction to beyond any road."""
+
+DAMPER_STARTS = {"rebound_ratio": 1.5, "knee_speed": 0.5}
+"""Where the search begins for a car whose damper is linear, SI."""
 
 PER_DEGREE = math.pi / 180.0
 """Factor from a quantity per radian to one per degree."""
@@ -124,6 +135,34 @@ def _pivot_angle(axle: AxleName) -> Parameter:
     )
 
 
+def _rebound_ratio(axle: AxleName) -> Parameter:
+    return Parameter(
+        name=f"{axle}.suspension.rebound_ratio",
+        symbol=f"rho_{axle[0].upper()}",
+        label=f"{axle.capitalize()} damper rebound ratio",
+        unit="1",
+        display_unit="1",
+        display_factor=1.0,
+        slider_lower=0.2,
+        slider_upper=5.0,
+        step=0.05,
+    )
+
+
+def _knee_speed(axle: AxleName) -> Parameter:
+    return Parameter(
+        name=f"{axle}.suspension.knee_speed",
+        symbol=f"v_{axle[0].upper()}",
+        label=f"{axle.capitalize()} damper knee speed",
+        unit="m/s",
+        display_unit="m/s",
+        display_factor=1.0,
+        slider_lower=0.02,
+        slider_upper=5.0,
+        step=0.01,
+    )
+
+
 PARAMETERS: tuple[Parameter, ...] = (
     _spring("front"),
     _damper("front"),
@@ -139,12 +178,25 @@ PARAMETERS: tuple[Parameter, ...] = (
     _pivot_angle("rear"),
 )
 
+"""The twelve, which a fit frees unless told otherwise."""
+
+DAMPER_PARAMETERS: tuple[Parameter, ...] = (
+    _rebound_ratio("front"),
+    _knee_speed("front"),
+    _rebound_ratio("rear"),
+    _knee_speed("rear"),
+)
+
+ALL_PARAMETERS = (*PARAMETERS, *DAMPER_PARAMETERS)
+
 PARAMETER_NAMES: tuple[str, ...] = tuple(row.name for row in PARAMETERS)
+DAMPER_NAMES: tuple[str, ...] = tuple(row.name for row in DAMPER_PARAMETERS)
+ALL_NAMES: tuple[str, ...] = (*PARAMETER_NAMES, *DAMPER_NAMES)
 
 
 def parameter(name: str) -> Parameter:
     """The row of the parameter with this name or symbol, in any case."""
-    known = {key.lower(): row for row in PARAMETERS for key in (row.name, row.symbol)}
+    known = {key.lower(): row for row in ALL_PARAMETERS for key in (row.name, row.symbol)}
     row = known.get(name.lower())
     if row is not None:
         return row
@@ -153,15 +205,15 @@ def parameter(name: str) -> Parameter:
         row = known[near[0]]
         hint = f"did you mean {row.name if '.' in near[0] else row.symbol}?"
     else:
-        hint = f"the twelve are {', '.join(PARAMETER_NAMES)}."
+        hint = f"there are {', '.join(ALL_NAMES)}."
     raise ParameterError(f"No parameter is called {name!r}; {hint}")
 
 
 def number_path(name: str) -> str:
-    """Path of a vehicle's number that is given by its path, or by its symbol if it is one of the
-    twelve, in any case.
+    """Path of a vehicle's number that is given by its path, or by its symbol if it is one of
+    `ALL_PARAMETERS`, in any case.
     """
-    paths = {path: path for path in numbers()} | {row.symbol: row.name for row in PARAMETERS}
+    paths = {path: path for path in numbers()} | {row.symbol: row.name for row in ALL_PARAMETERS}
     known = {told.lower(): told for told in paths}
     if (told := known.get(name.lower())) is not None:
         return paths[told]
@@ -174,8 +226,8 @@ def default_bounds(name: str, start: float) -> tuple[float, float]:
     """Lower and upper bound of a free parameter that starts at `start`.
 
     Stiffness and damping: 0.05 to 8 times the start, which must be positive. Pivot angle: -0.3 to
-    1.3 rad. Pivot distance: 0.1 to 10 m with the sign of the start. All of it within what a vehicle
-    accepts.
+    1.3 rad. Pivot distance: 0.1 to 10 m with the sign of the start. Rebound ratio: 0.2 to 10. Knee
+    speed: 0.02 to 20 m/s. All of it within what a vehicle accepts.
     """
     row = parameter(name)
     accepted = numbers()[row.name]
@@ -185,7 +237,8 @@ def default_bounds(name: str, start: float) -> tuple[float, float]:
 
 def bounds_rule(name: str) -> str:
     """The rule of `default_bounds` for a parameter, for a person to read."""
-    if ".pivot." in parameter(name).name:
+    row = parameter(name)
+    if ".pivot." in row.name or row.name in DAMPER_NAMES:
         return "the same for every car"
     lower, upper = SHARE_OF_START
     return f"{lower:g} to {upper:g} times the start"
@@ -194,6 +247,10 @@ def bounds_rule(name: str) -> str:
 def _wished_bounds(row: Parameter, start: float) -> tuple[float, float]:
     if row.name.endswith("pivot.angle"):
         return ANGLE_BOUNDS
+    if row.name.endswith("rebound_ratio"):
+        return RATIO_BOUNDS
+    if row.name.endswith("knee_speed"):
+        return KNEE_BOUNDS
     lower, upper = DISTANCE_BOUNDS
     if row.name.endswith("pivot.distance"):
         return (lower, upper) if start > 0.0 else (-upper, -lower)
@@ -203,3 +260,14 @@ def _wished_bounds(row: Parameter, start: float) -> tuple[float, float]:
             " it a positive start value, give its bounds, or fix it."
         )
     return SHARE_OF_START[0] * start, SHARE_OF_START[1] * start
+
+
+def damper_starts(vehicle: Vehicle, names: Collection[str]) -> dict[str, float]:
+    """Start values for those of some parameters that a car's linear dampers lack."""
+    linear = {axle: vehicle.axle(axle).suspension.linear for axle in AXLES}
+    found = {}
+    for row in DAMPER_PARAMETERS:
+        axle, _, number = row.name.split(".")
+        if row.name in names and (linear[axle] or vehicle.value(row.name) is None):
+            found[row.name] = DAMPER_STARTS[number]
+    return found

@@ -17,7 +17,7 @@ from .channels import OUTPUT_CHANNELS, Run
 from .equilibrium import static_loads
 from .errors import ProblemError, VehicleError
 from .filters import low_pass, too_coarse
-from .parameters import PARAMETER_NAMES, default_bounds, parameter
+from .parameters import ALL_NAMES, PARAMETER_NAMES, damper_starts, default_bounds, parameter
 from .rims import RimsInputs, filtered_outputs, prepare
 from .rims_settings import RimsSettings
 from .run_notes import DEFAULT_NOISE
@@ -112,9 +112,10 @@ class Problem:
     ) -> "Problem":
         """A problem from its parts, or one sentence on what is wrong with them.
 
-        free : names or symbols of the parameters to find; all twelve without
+        free : names or symbols of the parameters to find; the twelve of PARAMETERS without
         fixed : those to leave at the vehicle's (or the start's) value
-        bounds, start : by parameter name; default_bounds and the vehicle's values without
+        bounds, start : by parameter name; default_bounds and the vehicle's values without, those of
+            damper_starts where its damper is linear
         noise : standard deviation by channel, over what the runs state, over DEFAULT_NOISE
         outputs : channels to compare, for all runs or by run name; all that a run has without
 
@@ -123,13 +124,13 @@ class Problem:
         settings = settings or RimsSettings()
         if traction not in get_args(Traction):
             raise ProblemError(f'traction is "{traction}"; it can be "exact" or "paper".')
-        start = _by_name(start or {}, "start value")
+        names = _free_names(free, fixed)
+        start = damper_starts(vehicle, names) | _by_name(start or {}, "start value")
         try:
             vehicle = vehicle.with_values(start)
             static_loads(vehicle)
         except VehicleError as error:
             raise ProblemError(f"A start value cannot be used: {error}") from error
-        names = _free_names(free, fixed)
         limits = _by_name(bounds or {}, "pair of bounds")
         if held := [name for name in limits if name not in names]:
             raise ProblemError(
@@ -186,7 +187,7 @@ def _free_names(free: Iterable[str] | None, fixed: Iterable[str] | None) -> list
     both = [name for name in held if free is not None and name in wanted]
     if both:
         raise ProblemError(f"{both[0]} is listed both as free and as fixed; leave one of the two.")
-    names = [name for name in PARAMETER_NAMES if name in wanted and name not in held]
+    names = [name for name in ALL_NAMES if name in wanted and name not in held]
     if not names:
         raise ProblemError(
             "No parameter is free; free at least one, e.g. front.suspension.stiffness."

@@ -17,7 +17,7 @@ from .designs import Design
 from .errors import Cancelled, RideError
 from .excitation import Excitation
 from .figures import OK, figures, figures_of, reason
-from .parameters import PARAMETERS
+from .parameters import ALL_PARAMETERS
 from .side_by_side import SideBySide, side_by_side
 from .sweep_checks import check_sweep, threads_of, typical_cars
 from .vehicle import Vehicle, numbers
@@ -56,7 +56,7 @@ class Progress:
 
 def columns(design: Design) -> tuple[Column, ...]:
     """The columns of a sweep in their order: number, swept parameters, figures, status."""
-    labels = {row.name: row.label for row in PARAMETERS}
+    labels = {row.name: row.label for row in ALL_PARAMETERS}
     return (
         Column("car", "Number of the car", "1"),
         *(Column(name, labels.get(name, name), numbers()[name].unit) for name in design.names),

@@ -1,4 +1,4 @@
-// The twelve sliders, made from the service's table of parameters.
+// The sliders, made from the service's table of parameters.
 //
 // The truth is `values` of the store (SI); a slider shows it, clamped to its range. On each track
 // lie the baseline (a tick) and, after a fit, the 95 % interval of the identified value (a band).
@@ -39,9 +39,48 @@ export function withValues(vehicle, values) {
   return copy;
 }
 
-/** {path: value} of the parameters in a vehicle. */
-export const valuesOf = (vehicle) =>
-  Object.fromEntries(get("parameters").map(({ name }) => [name, valueAt(vehicle, name)]));
+/** Whether the dampers of an axle keep one slope in jounce and rebound, at every speed. */
+const isLinear = ({ suspension }) =>
+  (suspension.rebound_ratio ?? 1) === 1 && suspension.knee_speed === undefined;
+
+/** {path: value} of the parameters in a vehicle; linear dampers have none of those of bent ones. */
+export const valuesOf = (vehicle) => Object.fromEntries(get("parameters")
+  .filter(({ name, linear_start }) => linear_start === null || !isLinear(vehicle[name.split(".")[0]]))
+  .map(({ name }) => [name, valueAt(vehicle, name)])
+  .filter(([, value]) => value !== undefined));
+
+/** Whether a parameter is one of two-slope dampers. */
+export const ofBentDamper = ({ linear_start }) => linear_start !== null;
+
+export const bent = () => get("parameters").some((row) => ofBentDamper(row) && row.name in get("values"));
+
+/** The vehicle with linear dampers. */
+export function straightened(vehicle) {
+  const copy = structuredClone(vehicle);
+  for (const side of Object.keys(GROUPS)) {
+    copy[side].suspension.rebound_ratio = 1;
+    delete copy[side].suspension.knee_speed;
+  }
+  return copy;
+}
+
+/** Give the sliders' car dampers with two slopes and a knee, or linear ones. */
+export function bend(wanted) {
+  const rows = get("parameters").filter(ofBentDamper);
+  const values = { ...get("values") };
+  for (const { name, linear_start } of rows) {
+    if (wanted) values[name] ??= linear_start;
+    else delete values[name];
+  }
+  set(wanted ? { values } : { vehicle: straightened(get("vehicle")), values });
+}
+
+/** Every slider back to the baseline, whose dampers may be linear. */
+function resetAll() {
+  const values = valuesOf(get("baseline"));
+  const linear = !get("parameters").some((row) => ofBentDamper(row) && row.name in values);
+  set(linear ? { vehicle: straightened(get("vehicle")), values } : { values });
+}
 
 /** Build the panel once the table is here. */
 export function build({ onBaseline }) {
@@ -51,7 +90,7 @@ export function build({ onBaseline }) {
       h("h2", {}, "Parameters"),
       h("button", {
         type: "button", id: "reset-all", title: "Every slider back to the baseline",
-        on: { click: () => set({ values: valuesOf(get("baseline")) }) },
+        on: { click: resetAll },
       }, "Reset"),
       h("button", {
         type: "button", id: "set-baseline",
@@ -222,9 +261,12 @@ function show() {
   let changed = 0;
   for (const [name, parts] of rows) {
     const { parameter, slider, field, lower, upper } = parts;
+    parts.element.hidden = !(name in values);
+    if (parts.element.hidden) continue;
     const factor = parameter.display_factor;
     const shown = values[name] * factor;
-    const start = valueAt(baseline, name) * factor;
+    const compared = valueAt(baseline, name);
+    const start = (compared ?? values[name]) * factor;
     const at = (x) => {
       const share = Math.min(Math.max((x - lower) / (upper - lower), 0), 1);
       return `calc(${THUMB / 2}px + ${share} * (100% - ${THUMB}px))`;
@@ -243,11 +285,13 @@ function show() {
     parts.reset.title = `Back to the baseline, ${units.number(start)} ${parameter.display_unit}`;
     parts.reset.disabled = !moved;
     parts.baseline.style.left = at(start);
+    parts.baseline.hidden = compared === undefined;
     band(parts, estimates.get(name), factor, at, shown);
   }
   $("#interval-legend").hidden = estimates.size === 0;
-  $("#reset-all").disabled = changed === 0;
-  $("#set-baseline").disabled = changed === 0;
+  const same = changed === 0 && Object.keys(valuesOf(baseline)).length === Object.keys(values).length;
+  $("#reset-all").disabled = same;
+  $("#set-baseline").disabled = same;
 }
 
 /** The fit's interval on the track; beside it ± where the slider holds the fit, else its value. */

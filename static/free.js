@@ -1,7 +1,7 @@
 // Which parameters an identification is free to move, from where and between which bounds.
 
 import * as api from "./api.js";
-import { holds } from "./controls.js";
+import { bend, bent, holds } from "./controls.js";
 import { h, symbol } from "./dom.js";
 import { get, on, set } from "./store.js";
 import * as units from "./units.js";
@@ -13,6 +13,7 @@ const typed = {};
 /** What brings each row up to date with sliders and bounds. */
 let rows = [];
 let note = null;
+let body = null;
 
 /** Keep the table's numbers in step with sliders and default bounds. */
 export function build() {
@@ -20,6 +21,7 @@ export function build() {
 }
 
 function show() {
+  if (body.childElementCount !== shown().length) fill();
   rows.forEach((update) => update());
   const held = names().some(heldBounds);
   note.textContent = held ? "start at the sliders; yellow: bounds of the applied fit"
@@ -28,23 +30,43 @@ function show() {
     "the start, they would let it run on with every fit. Type others, or fix the parameter." : "";
 }
 
+/** The table's rows: of parameters that the sliders' car has. */
+function fill() {
+  rows = [];
+  body.replaceChildren(...shown().map(freeRow));
+}
+
+const shown = () => get("parameters").filter(({ name }) => name in get("values"));
+
+function dampers() {
+  const box = h("input", {
+    type: "checkbox", id: "two-slope", checked: bent(), on: { change: () => bend(box.checked) },
+  });
+  return h("label", {
+    className: "inline", title: "Another slope in rebound than in jounce, and a speed from which the " +
+      "force grows less: four more parameters",
+  }, box, " Two-slope dampers");
+}
+
 export function view() {
   askBounds();
-  rows = [];
   note = h("span", { className: "hint plain", id: "free-note" });
+  body = h("tbody");
+  fill();
   const section = h("section", {},
     h("h3", {}, "Free parameters ", note),
+    dampers(),
     h("table", { className: "free" },
       h("thead", {}, h("tr", {}, COLUMNS.map((text) =>
         h("th", { scope: "col", className: text === "Unit" ? "unit" : "" }, text)))),
-      h("tbody", {}, get("parameters").map(freeRow))));
+      body));
   show();
   return section;
 }
 
 /** Names of the free parameters. */
 export const names = () =>
-  get("parameters").map(({ name }) => name).filter((name) => !fixed.has(name));
+  shown().map(({ name }) => name).filter((name) => !fixed.has(name));
 
 /** {name: [lower, upper]} of the free parameters whose bounds are not the default. */
 export async function bounds() {

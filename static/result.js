@@ -1,7 +1,7 @@
 // What an identification found, and how far it is while it runs.
 
 import { percent, short } from "./comfort.js";
-import { DETERMINED, isBounded, valuesOf, withValues } from "./controls.js";
+import { DETERMINED, isBounded, straightened, valuesOf, withValues } from "./controls.js";
 import { costChart } from "./cost.js";
 import { $, breakable, fileName, h, saveFile, symbol } from "./dom.js";
 import { distinct, nameOf } from "./names.js";
@@ -24,7 +24,7 @@ export function view(job, holdouts, apply) {
   cost = null;
   if (!job) {
     return h("p", { className: "empty" },
-      "No fit yet. “Identify” fits the twelve parameters to the runs marked “fit” and takes a " +
+      "No fit yet. “Identify” fits the free parameters to the runs marked “fit” and takes a " +
       "few seconds.");
   }
   const { result } = job;
@@ -72,7 +72,8 @@ function outcome(job) {
 /** A fit holds for the known data it was made with: the stiffnesses of one car suit no other. */
 function ofAnotherCar({ vehicle }) {
   const now = get("vehicle");
-  const known = (car) => JSON.stringify({ ...withValues(car, valuesOf(now)), name: "", source: "" });
+  const known = (car) => JSON.stringify(
+    { ...straightened(withValues(car, valuesOf(now))), name: "", source: "" });
   if (known(vehicle) === known(now)) return null;
   return h("p", { className: "more", id: "other-car" }, vehicle.name === now.name
     ? "Found before the car's known data were changed; identify again."

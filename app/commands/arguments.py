@@ -150,7 +150,7 @@ def _intervals(marks: Sequence[str], path: str) -> tuple[Interval, ...]:
 
 
 def _identified(name: str) -> str:
-    """Path of one of the twelve parameters."""
+    """Path of a parameter of an identification."""
     return parameter(name).name
 
 

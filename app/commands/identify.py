@@ -10,6 +10,7 @@ from ...engine.channels import Run
 from ...engine.fit import Fit, Progress
 from ...engine.fit_file import fit_to_json
 from ...engine.identification import identify as fit_to_runs
+from ...engine.parameters import DAMPER_NAMES, PARAMETER_NAMES
 from ...engine.problem import Problem
 from ...engine.vehicle import Vehicle
 from .arguments import bounds, rims_settings, starts
@@ -42,7 +43,7 @@ def fitted(options: Namespace, vehicle: Vehicle, runs: Sequence[Run]) -> Fit:
     problem = Problem.build(
         vehicle,
         runs,
-        options.free or None,
+        _free(options),
         options.fixed or None,
         bounds=bounds(options.bounds),
         start=starts(options.start),
@@ -54,6 +55,13 @@ def fitted(options: Namespace, vehicle: Vehicle, runs: Sequence[Run]) -> Fit:
     if watched:
         print("\r\033[K", end="", file=sys.stderr)
     return fit
+
+
+def _free(options: Namespace) -> list[str] | None:
+    """The parameters to find, or None for the twelve."""
+    if options.damper != "two-slope":
+        return options.free or None
+    return [*(options.free or PARAMETER_NAMES), *DAMPER_NAMES]
 
 
 def _show(progress: Progress) -> None:

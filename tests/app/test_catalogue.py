@@ -5,7 +5,7 @@ import math
 import pytest
 from ridetune.engine.channels import CHANNELS
 from ridetune.engine.manoeuvre import manoeuvre_from_json, reference_manoeuvres
-from ridetune.engine.parameters import PARAMETER_NAMES
+from ridetune.engine.parameters import ALL_NAMES
 from ridetune.engine.rims_settings import RimsSettings
 from ridetune.engine.run_notes import DEFAULT_NOISE
 from ridetune.engine.vehicle_file import reference_vehicles, vehicle_from_json
@@ -13,7 +13,7 @@ from ridetune.engine.vehicle_file import reference_vehicles, vehicle_from_json
 
 def test_the_tables_are_the_engines(client):
     parameters = client.get("/api/parameters").json()
-    assert [row["name"] for row in parameters] == list(PARAMETER_NAMES)
+    assert [row["name"] for row in parameters] == list(ALL_NAMES)
     assert all(row["slider_lower"] < row["slider_upper"] for row in parameters)
     assert all(row["lower"] <= row["slider_lower"] for row in parameters)
     assert all(row["slider_upper"] <= row["upper"] for row in parameters)

@@ -10,9 +10,10 @@ from ridetune.engine.channels import WHEEL_CHANNELS, Run
 from ridetune.engine.fit import Outcome
 from ridetune.engine.identification import Problem, identify
 from ridetune.engine.measurement import read_run
-from ridetune.engine.parameters import PARAMETER_NAMES, PARAMETERS
+from ridetune.engine.parameters import ALL_NAMES, DAMPER_NAMES, PARAMETER_NAMES, PARAMETERS
 from ridetune.engine.problem import DEFAULT_NOISE
 from ridetune.engine.residuals import Residuals
+from ridetune.engine.rims_settings import RimsSettings
 from ridetune.engine.simulation import rims_batch, simulate_rims
 from ridetune.engine.uncertainty import uncertainty
 from ridetune.engine.vehicle_file import read_vehicle
@@ -57,6 +58,42 @@ def test_a_noise_free_twin_returns_all_twelve_parameters(campaign):
     assert max(map(abs, errors_in_percent(fit).values())) < 0.1
     assert fit.outcome == Outcome.DETERMINED
     assert not fit.warnings
+
+
+def test_a_noise_free_twin_with_two_slope_dampers_returns_all_sixteen_parameters():
+    """Oracle: the car that drove. What remains is the step at the kink, 3e-3 of roll."""
+    true = {
+        "front.suspension.rebound_ratio": 2.0,
+        "front.suspension.knee_speed": 0.6,
+        "rear.suspension.rebound_ratio": 1.8,
+        "rear.suspension.knee_speed": 0.8,
+    }
+    car = CAR.with_values(true)
+    fit = identify(
+        Problem.build(CAR, drive_campaign(car), ALL_NAMES, settings=RimsSettings(step=0.00125))
+    )
+    assert fit.converged
+    for found in fit.parameters:
+        assert found.value == pytest.approx(car.value(found.name), rel=0.02), found.name
+
+
+def test_two_slope_dampers_predict_the_detailed_car_better(detailed):
+    """Oracle: the run held out, and what a linear damper predicts of it (70, 87 and 66 %)."""
+    vehicle, seen, unseen = detailed
+    fit = identify(Problem.build(vehicle, [seen], ALL_NAMES))
+    percent = simulate_rims(fit.vehicle, unseen).fit_percent
+    assert percent["chassis.z"] > 87.0
+    assert percent["chassis.pitch"] > 90.0
+    assert percent["chassis.roll"] > 77.0
+
+
+def test_a_knee_that_is_not_there_is_not_determined():
+    """Oracle: the car that drove has linear dampers."""
+    runs = drive_campaign(CAR, noise=DEFAULT_NOISE)
+    knees = [name for name in DAMPER_NAMES if name.endswith("knee_speed")]
+    fit = identify(Problem.build(CAR, runs, [*PARAMETER_NAMES[:4], *knees]))
+    assert fit.converged
+    assert {one.determined for one in fit.parameters if one.name in knees} == {"no"}
 
 
 def test_the_paper_s_traction_biases_stiffness_and_bar(campaign):

@@ -3,8 +3,11 @@ import math
 import pytest
 from ridetune.engine.errors import ParameterError
 from ridetune.engine.parameters import (
-    PARAMETER_NAMES,
+    ALL_NAMES,
+    ALL_PARAMETERS,
+    DAMPER_NAMES,
     PARAMETERS,
+    damper_starts,
     default_bounds,
     parameter,
 )
@@ -18,7 +21,12 @@ def test_the_twelve_stand_in_the_order_of_table_3():
     assert [row.symbol for row in PARAMETERS] == symbols.split()
 
 
-@pytest.mark.parametrize("row", PARAMETERS, ids=lambda row: row.symbol)
+def cars_with(row):
+    """Reference cars that have the parameter."""
+    return [car for car in reference_vehicles().values() if car.value(row.name) is not None]
+
+
+@pytest.mark.parametrize("row", ALL_PARAMETERS, ids=lambda row: row.symbol)
 class TestEveryParameter:
     def test_its_name_is_a_number_of_the_vehicle_with_the_same_unit(self, row):
         assert numbers()[row.name].unit == row.unit
@@ -33,14 +41,14 @@ class TestEveryParameter:
         assert accepted.holds(row.slider_upper)
 
     def test_its_slider_reaches_every_reference_car(self, row):
-        for car in reference_vehicles().values():
+        for car in cars_with(row):
             assert row.slider_lower <= car.value(row.name) <= row.slider_upper
 
     def test_its_slider_has_steps_a_hand_can_use(self, row):
         assert 50 <= (row.slider_upper - row.slider_lower) / row.step <= 2500
 
     def test_its_default_bounds_hold_the_start_of_every_reference_car(self, row):
-        cars = [car for car in reference_vehicles().values() if car.value(row.name) != 0.0]
+        cars = [car for car in cars_with(row) if car.value(row.name) != 0.0]
         for car in cars:
             start = car.value(row.name)
             lower, upper = default_bounds(row.name, start)
@@ -92,4 +100,18 @@ def test_a_misspelt_parameter_is_answered_with_the_nearest(name, near):
 def test_an_unknown_parameter_is_answered_with_all_names():
     with pytest.raises(ParameterError) as caught:
         parameter("xyz")
-    assert all(name in str(caught.value) for name in PARAMETER_NAMES)
+    assert all(name in str(caught.value) for name in ALL_NAMES)
+
+
+def test_a_linear_damper_lacks_start_values_which_a_bent_one_has():
+    car = reference_vehicles()["paper"]
+    starts = {"rebound_ratio": 1.5, "knee_speed": 0.5}
+    assert damper_starts(car, ALL_NAMES) == {
+        name: starts[name.rpartition(".")[2]] for name in DAMPER_NAMES
+    }
+    front = car.with_values({"front.suspension.knee_speed": 0.3})
+    assert damper_starts(front, DAMPER_NAMES) == {
+        "rear.suspension.rebound_ratio": 1.5,
+        "rear.suspension.knee_speed": 0.5,
+    }
+    assert damper_starts(car, ["front.suspension.damping"]) == {}
