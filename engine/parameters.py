@@ -139,7 +139,7 @@ def _rebound_ratio(axle: AxleName) -> Parameter:
     return Parameter(
         name=f"{axle}.suspension.rebound_ratio",
         symbol=f"rho_{axle[0].upper()}",
-        label=f"{axle.capitalize()} damper rebound ratio",
+        label=f"{axle.capitalize()} rebound ratio",
         unit="1",
         display_unit="1",
         display_factor=1.0,
@@ -153,7 +153,7 @@ def _knee_speed(axle: AxleName) -> Parameter:
     return Parameter(
         name=f"{axle}.suspension.knee_speed",
         symbol=f"v_{axle[0].upper()}",
-        label=f"{axle.capitalize()} damper knee speed",
+        label=f"{axle.capitalize()} knee speed",
         unit="m/s",
         display_unit="m/s",
         display_factor=1.0,

@@ -40,7 +40,7 @@ export const breakable = (name) => name.split(/(?<=[_-])/).flatMap((part) => [pa
 /** A parameter's symbol such as `K_F` or `phi_R`, with its index set low. */
 export function symbol(text) {
   const [base, index] = text.split("_");
-  const greek = base === "phi" ? "φ" : base;
+  const greek = { phi: "φ", rho: "ρ" }[base] ?? base;
   return h("span", { className: "symbol" }, greek, index ? h("sub", {}, index) : null);
 }
 
