@@ -70,7 +70,7 @@ def test_a_noise_free_twin_with_two_slope_dampers_returns_all_sixteen_parameters
     }
     car = CAR.with_values(true)
     fit = identify(
-        Problem.build(CAR, drive_campaign(car), ALL_NAMES, settings=RimsSettings(step=0.00125))
+        Problem.build(CAR, drive_table_2(car), ALL_NAMES, settings=RimsSettings(step=0.00125))
     )
     assert fit.converged
     for found in fit.parameters:
@@ -89,7 +89,7 @@ def test_two_slope_dampers_predict_the_detailed_car_better(detailed):
 
 def test_a_knee_that_is_not_there_is_not_determined():
     """Oracle: the car that drove has linear dampers."""
-    runs = drive_campaign(CAR, noise=DEFAULT_NOISE)
+    runs = drive_table_2(CAR, noise=DEFAULT_NOISE)
     knees = [name for name in DAMPER_NAMES if name.endswith("knee_speed")]
     fit = identify(Problem.build(CAR, runs, [*PARAMETER_NAMES[:4], *knees]))
     assert fit.converged
