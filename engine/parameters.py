@@ -141,7 +141,7 @@ def _rebound_ratio(axle: AxleName) -> Parameter:
         symbol=f"rho_{axle[0].upper()}",
         label=f"{axle.capitalize()} rebound ratio",
         unit="1",
-        display_unit="1",
+        display_unit="",
         display_factor=1.0,
         slider_lower=0.2,
         slider_upper=5.0,

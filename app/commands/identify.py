@@ -10,7 +10,7 @@ from ...engine.channels import Run
 from ...engine.fit import Fit, Progress
 from ...engine.fit_file import fit_to_json
 from ...engine.identification import identify as fit_to_runs
-from ...engine.parameters import DAMPER_NAMES, PARAMETER_NAMES
+from ...engine.parameters import DAMPER_NAMES, PARAMETER_NAMES, parameter
 from ...engine.problem import Problem
 from ...engine.vehicle import Vehicle
 from .arguments import bounds, rims_settings, starts
@@ -61,7 +61,9 @@ def _free(options: Namespace) -> list[str] | None:
     """The parameters to find, or None for the twelve."""
     if options.damper != "two-slope":
         return options.free or None
-    return [*(options.free or PARAMETER_NAMES), *DAMPER_NAMES]
+    fixed = {parameter(name).name for name in options.fixed or ()}
+    usual = [*(options.free or PARAMETER_NAMES), *DAMPER_NAMES]
+    return [name for name in usual if name in (options.free or ()) or name not in fixed]
 
 
 def _show(progress: Progress) -> None:

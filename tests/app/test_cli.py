@@ -302,6 +302,21 @@ def test_how_a_recording_is_prepared_is_the_caller_s_and_is_kept(folder, driven)
     assert [run["braking"] for run in fit["runs"]] == [[], [[2.5, 3.0], [1.0, 2.0]]]
 
 
+def test_two_slope_dampers_are_found_beside_what_else_is_free(folder, driven):
+    """With `--fixed` as for every parameter."""
+    command = ["identify", str(driven), "--vehicle", "paper", "--free", "K_F", "-o", "fit.json"]
+    assert main([*command, "--damper", "two-slope", "--fixed", "v_R"]) == 0
+    fit = json.loads((folder / "fit.json").read_text())
+    found = [one["name"] for one in fit["parameters"]]
+    assert found == [
+        "front.suspension.stiffness",
+        "front.suspension.rebound_ratio",
+        "front.suspension.knee_speed",
+        "rear.suspension.rebound_ratio",
+    ]
+    assert "rebound_ratio" in fit["vehicle"]["rear"]["suspension"]
+
+
 def test_a_path_names_the_run_where_the_file_s_name_names_two(folder, driven, capsys):
     """Marks may begin before the record, which cuts them."""
     run = read_run(driven)

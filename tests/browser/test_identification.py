@@ -307,3 +307,24 @@ def test_a_known_number_keeps_the_hand_in_its_field(visitor):
     mass.fill("")
     mass.press("Tab")
     assert mass.input_value() == "1100"
+
+
+def test_two_slope_dampers_are_switched_on_and_off(visitor):
+    """Four more sliders and rows; the start's slopes change the ride, and off is as before."""
+    before = visitor.line("chassis.z")
+    visitor.click("#tab-identification")
+    rows = visitor.element(".free tbody tr")
+    assert rows.count() == 12
+    visitor.click("#two-slope")
+    visitor.settled()
+    assert rows.count() == 16
+    assert visitor.value("front.suspension.rebound_ratio") == 1.5
+    ratio = visitor.page.locator(".free tbody tr", has_text="ρF")
+    assert ratio.locator("td.unit").inner_text() == ""
+    assert visitor.element("#value-rear-suspension-knee_speed").input_value() == "0.5"
+    assert np.abs(visitor.line("chassis.z") - before).max() > 0.1
+    visitor.click("#two-slope")
+    visitor.settled()
+    assert rows.count() == 12
+    assert not visitor.element("#value-rear-suspension-knee_speed").is_visible()
+    np.testing.assert_allclose(visitor.line("chassis.z"), before, atol=1e-9)
