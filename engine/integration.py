@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .errors import SimulationDiverged, SimulationError
 from .frames import COORDINATES, CORNERS
 from .kernels.buffer import BODY_ROWS
-from .kernels.integrate import integrate_free, integrate_rims
+from .kernels.integrate import Batch, Course, integrate_free, integrate_rims
 from .kernels.lanes import BATCH, ONE_CAR
 from .kernels.observe import OUTPUTS, CarOutput, CornerOutput, observe_free, observe_rims
 from .kernels.records import Corner
@@ -22,6 +22,7 @@ from .road import Road
 from .stepping import FreeInputs
 
 Array = NDArray[np.float64]
+Kernel = Callable[[tuple[int, ...], Batch], None]
 
 _NEWTON_STEPS = 25
 _DIFFERENCE = 1e-6
@@ -109,53 +110,19 @@ def rims_tallies(
     return Tallies(values, *_tally(driven, cars, start, reduced, values, threads))
 
 
-def _free(inputs: FreeInputs) -> Callable:
+def _free(inputs: FreeInputs) -> Kernel:
     """The kernel bound to what drives the free car."""
-    road = inputs.road
-
-    def integrate(lanes, cars, states, watch, out, failed, reach, tallies):
-        integrate_free(
-            lanes,
-            cars,
-            states,
-            inputs.stage_inputs,
-            inputs.steps,
-            inputs.samples,
-            road.coefficients,
-            road.start,
-            road.spacing,
-            watch,
-            out,
-            failed,
-            reach,
-            tallies,
-        )
-
-    return integrate
+    course, road = Course(inputs.stage_inputs, inputs.steps, inputs.samples), inputs.road
+    return lambda lanes, batch: integrate_free(
+        lanes, course, batch, road.coefficients, road.start, road.spacing
+    )
 
 
-def _on_rims(inputs: RimsInputs, exact: bool) -> Callable:
+def _on_rims(inputs: RimsInputs, exact: bool) -> Kernel:
     """The kernel bound to prescribed rims."""
-    steps = np.diff(inputs.node_time)
-    samples = np.arange(inputs.node_time.size)
-
-    def integrate(lanes, cars, states, watch, out, failed, reach, tallies):
-        integrate_rims(
-            lanes,
-            cars,
-            states,
-            inputs.stage_inputs,
-            steps,
-            samples,
-            1.0 if exact else 0.0,
-            watch,
-            out,
-            failed,
-            reach,
-            tallies,
-        )
-
-    return integrate
+    nodes = inputs.node_time
+    course = Course(inputs.stage_inputs, np.diff(nodes), np.arange(nodes.size))
+    return lambda lanes, batch: integrate_rims(lanes, course, batch, 1.0 if exact else 0.0)
 
 
 def _free_start(cars: Array, inputs: FreeInputs) -> Array:
@@ -230,7 +197,7 @@ def _states(out: Array, failed: NDArray[np.int64], reach: Array) -> States:
 
 
 def _run(
-    integrate: Callable, cars: Array, start: Array, out: Array, threads: int | None
+    integrate: Kernel, cars: Array, start: Array, out: Array, threads: int | None
 ) -> tuple[NDArray[np.int64], Array]:
     """Integrate and keep states; returns first failures and reaches."""
     lanes = ONE_CAR if len(cars) == 1 else BATCH
@@ -239,7 +206,7 @@ def _run(
 
 
 def _tally(
-    integrate: Callable,
+    integrate: Kernel,
     cars: Array,
     start: Array,
     reduced: Reduction,
@@ -252,7 +219,7 @@ def _tally(
 
 
 def _in_threads(
-    integrate: Callable,
+    integrate: Kernel,
     lanes: tuple[int, ...],
     cars: Array,
     start: Array,
@@ -266,7 +233,8 @@ def _in_threads(
 
     def run(part: slice) -> None:
         rows = cars[part], start[part]
-        integrate(lanes, *rows, watch, out[part], failed[part], reach[part], tallies[part])
+        told = out[part], failed[part], reach[part], tallies[part]
+        integrate(lanes, Batch(*rows, watch, *told))
 
     parts = _parts(len(cars), len(lanes), threads)
     if len(parts) == 1:

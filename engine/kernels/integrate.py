@@ -5,6 +5,8 @@ from inside the step, so that a jump of the torque between two steps costs no or
 kept at the samples, or tallied there, or both.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..jit import compiled, inlined
@@ -13,12 +15,47 @@ from .free import free_slopes
 from .histogram import BINS, QUANTITIES, percentiles
 from .on_rims import rim_slopes
 from .tally import TALLY_END, TALLY_ROWS, clear_tally, keep_tally, tally
+from .watch import Watch
 from .weighing import set_filters, watch_point, weigh
 
 _ANGLE_LIMIT = 1.5
 """rad: beyond it the polynomials of elementary.py lose accuracy and the car lies on its side."""
 _HEIGHT_LIMIT = 10.0
 """m"""
+
+
+class Course(NamedTuple):
+    """What all cars are driven by.
+
+    inputs (n, 3, 16 or 15) : stage inputs at the beginning, middle and end of each step
+    steps (n,) : step lengths, s
+    samples (n + 1,) : index of the sample before step k, or -1
+    """
+
+    inputs: np.ndarray
+    steps: np.ndarray
+    samples: np.ndarray
+
+
+class Batch(NamedTuple):
+    """Cars that are driven, and where is written what becomes of them.
+
+    cars (C, CAR_ROWS) : records of `car_rows.car_row`
+    states (C, 16) : at the first instant
+    watch : what is tallied
+    out (C, S, 16) : states at the samples, or (C, 0, 16) where they are not kept
+    failed (C,) : set to the first sample at which a car left the model's range, else left alone
+    reach (C,) : likewise to the least reach of its arms and clearance of its mounts until then
+    tallies (C, TALLY_ROWS + QUANTITIES P) : rows of `tally.py` and percentiles, or (C, 0)
+    """
+
+    cars: np.ndarray
+    states: np.ndarray
+    watch: Watch
+    out: np.ndarray
+    failed: np.ndarray
+    reach: np.ndarray
+    tallies: np.ndarray
 
 
 @inlined
@@ -91,11 +128,11 @@ def _stages(inputs):
 
 
 @inlined
-def _integrate(
-    slopes, driven, lanes, cars, states, inputs, steps, samples, watch, out, failed, reach, tallies
-):
+def _integrate(slopes, driven, lanes, course, batch):
     """Drive every car; slopes (buffer, LANES, row of stage inputs, driven) finds derivatives."""
     LANES = len(lanes)
+    inputs, steps, samples = course
+    cars, states, watch, out, failed, reach, tallies = batch
     buffer = np.zeros(TALLY_END * LANES)
     # A car by itself is not tallied, which spares compiling it.
     keeping, tallying = out.shape[1] > 0, LANES > 1 and tallies.shape[1] > 0
@@ -140,79 +177,24 @@ def _integrate(
 
 
 @compiled
-def integrate_free(
-    lanes,
-    cars,
-    states,
-    inputs,
-    steps,
-    samples,
-    road,
-    start,
-    spacing,
-    watch,
-    out,
-    failed,
-    reach,
-    tallies,
-):
+def integrate_free(lanes, course, batch, road, start, spacing):
     """Road and posts modes.
 
     lanes : tuple, its length is the number of cars side by side
-    cars (C, CAR_ROWS) : records of `car_rows.car_row`
-    states (C, 16) : at the first instant
-    inputs (n, 3, 16) : post heights (4), their rates (4), drive torques (4), brake torques (4)
-        at the beginning, middle and end of each step
-    steps (n,) : step lengths, s
-    samples (n + 1,) : index of the sample before step k, or -1
+    course : a `Course` of post heights (4), their rates (4), drive torques (4), brake torques (4)
+    batch : a `Batch`
     road (2, cells, 4), start, spacing : cubics of `road.Road`, left and right
-    watch : `Watch` of what is tallied
-    out (C, S, 16) : states at the samples, or (C, 0, 16) where they are not kept
-    failed (C,) : set to the first sample at which a car left the model's range, else left alone
-    reach (C,) : likewise to the least reach of its arms and clearance of its mounts until then
-    tallies (C, TALLY_ROWS + QUANTITIES P) : rows of `tally.py` and percentiles, or (C, 0)
     """
-    driven = (road, start, spacing)
-    _integrate(
-        free_slopes,
-        driven,
-        lanes,
-        cars,
-        states,
-        inputs,
-        steps,
-        samples,
-        watch,
-        out,
-        failed,
-        reach,
-        tallies,
-    )
+    _integrate(free_slopes, (road, start, spacing), lanes, course, batch)
 
 
 @compiled
-def integrate_rims(
-    lanes, cars, states, inputs, steps, samples, exact, watch, out, failed, reach, tallies
-):
+def integrate_rims(lanes, course, batch, exact):
     """Rims mode; arguments as in `integrate_free`, but
 
-    inputs (n, 3, 15) : u (4), u' (4), u'' (4), a_x, v_x and the braking weight b
+    course : of u (4), u' (4), u'' (4), a_x, v_x and the braking weight b
     exact : 1.0 for the exact traction, 0.0 for the paper's
-    out : x, z, pitch, roll and their rates are valid; the arms follow from them
+
+    Of the states written x, z, pitch, roll and their rates are valid; the arms follow from them.
     """
-    driven = (exact,)
-    _integrate(
-        rim_slopes,
-        driven,
-        lanes,
-        cars,
-        states,
-        inputs,
-        steps,
-        samples,
-        watch,
-        out,
-        failed,
-        reach,
-        tallies,
-    )
+    _integrate(rim_slopes, (exact,), lanes, course, batch)
