@@ -9,6 +9,7 @@ are drawn. Parameters go by their path or symbol; every number of a vehicle can 
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -128,7 +129,7 @@ class FullFactorial:
         return {"kind": self.kind, "levels": levels}
 
 
-class _Sampled:
+class _Sampled(ABC):
     """Points in a box of ranges."""
 
     kind: ClassVar[str]
@@ -155,9 +156,9 @@ class _Sampled:
         ranges = {name: list(pair) for name, pair in zip(self.names, limits, strict=True)}
         return {"kind": self.kind, "ranges": ranges, "cars": self.cars, "seed": self.seed}
 
+    @abstractmethod
     def _points(self, first: int, end: int) -> Array:
         """Points (end - first, parameters) of the unit box."""
-        raise NotImplementedError
 
 
 class LatinHypercube(_Sampled):
