@@ -48,23 +48,27 @@ def all_to_json(services: Services, sid: str, view: View) -> list[dict[str, Any]
     return [job_to_json(job, view) for job in services.jobs.of_session(sid, view.kind)]
 
 
-def submitted(
+async def submitted(
     services: Services,
     sid: str,
     view: View,
-    *,
     key: str | None,
-    asked: str,
+    asked: Callable[[], str],
     spec: Callable[[], Mapping[str, Any]],
 ) -> dict[str, Any]:
     """The job kept under a request's key whatever has changed since, else a new one.
 
-    asked : stands for the request;  spec : gives everything that the job needs, checked
+    asked : gives what stands for the request;  spec : everything that the job needs, checked
     """
-    job = services.jobs.known(sid, key, asked)
-    if job is None:
-        job = services.jobs.submit(sid, view.kind, {**spec(), "asked": asked}, key)
-    return job_to_json(job, view)
+
+    def found_or_queued() -> dict[str, Any]:
+        request = asked()
+        job = services.jobs.known(sid, key, request)
+        if job is None:
+            job = services.jobs.submit(sid, view.kind, {**spec(), "asked": request}, key)
+        return job_to_json(job, view)
+
+    return await services.interactive.run(sid, found_or_queued)
 
 
 def _instant(seconds: float | None) -> str | None:

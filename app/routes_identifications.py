@@ -33,16 +33,8 @@ router = job_router("identifications", VIEW)
 @router.post("", status_code=202)
 async def submit(sid: SessionId, services: Shared, body: IdentificationRequest) -> dict[str, Any]:
     """Queue an identification; the same `key` again gives the same job."""
-    return await services.interactive.run(
-        sid,
-        lambda: submitted(
-            services,
-            sid,
-            VIEW,
-            key=body.key,
-            asked=as_asked(body),
-            spec=lambda: _spec(services, sid, body),
-        ),
+    return await submitted(
+        services, sid, VIEW, body.key, lambda: as_asked(body), lambda: _spec(services, sid, body)
     )
 
 

@@ -43,16 +43,8 @@ router = job_router("sweeps", VIEW)
 async def submit(sid: SessionId, services: Shared, body: SweepRequest) -> dict[str, Any]:
     """Queue a sweep; the same `key` again gives the same job."""
     services.warmup.require()
-    return await services.interactive.run(
-        sid,
-        lambda: submitted(
-            services,
-            sid,
-            VIEW,
-            key=body.key,
-            asked=as_asked(body),
-            spec=lambda: _spec(services, sid, body),
-        ),
+    return await submitted(
+        services, sid, VIEW, body.key, lambda: as_asked(body), lambda: _spec(services, sid, body)
     )
 
 
