@@ -20,6 +20,7 @@ from .reductions import Reduction
 from .rims import RimsInputs
 from .road import Road
 from .stepping import FreeInputs
+from .wheel_plane import plane_on_wheels
 
 Array = NDArray[np.float64]
 Kernel = Callable[[tuple[int, ...], Batch], None]
@@ -300,13 +301,7 @@ def _rims_rest(cars: Array, heights: Array) -> Array:
         reached = np.all(out[:, _REACHES] >= 0.0, axis=1)
         return np.where(reached[:, np.newaxis], out[:, 1:4], np.nan)
 
-    return _rest(accelerations, cars, _planes(cars, heights))
-
-
-def _planes(cars: Array, heights: Array) -> Array:
-    """z, pitch and roll (C, 3) of rigid cars whose wheel centres come nearest to four heights."""
-    x, y = _wheel_places(cars)
-    return np.linalg.pinv(np.stack([np.ones(x.shape), -x, y], axis=2)) @ heights
+    return _rest(accelerations, cars, plane_on_wheels(*_wheel_places(cars), heights))
 
 
 def _wheel_places(cars: Array) -> tuple[Array, Array]:

@@ -16,6 +16,7 @@ from .frames import CORNERS, GRAVITY
 from .spikes import spikes
 from .vehicle import Vehicle
 from .wheel_order import exchanged_wheels
+from .wheel_plane import plane_on_wheels
 
 REST_WINDOW = 0.5
 """The start of a record looked at for rest, s."""
@@ -149,14 +150,11 @@ def _rest_values(run: Run, vehicle: Vehicle) -> list[str]:
 
 
 def _plane(vehicle: Vehicle, heights: list[np.floating]) -> list[float]:
-    """z, pitch and roll of a rigid body that lies nearest to four wheel centres' heights, m."""
+    """z, pitch and roll of a vehicle's body on four wheel centres' heights, m."""
     front, rear = vehicle.front, vehicle.rear
-    rows = [
-        [1.0, -x, side * 0.5 * axle.track]
-        for axle, x in ((front, front.cg_distance), (rear, -rear.cg_distance))
-        for side in (1.0, -1.0)
-    ]
-    return np.linalg.lstsq(np.array(rows), np.array(heights), rcond=None)[0].tolist()
+    x = np.repeat([front.cg_distance, -rear.cg_distance], 2)
+    y = np.array([side * 0.5 * axle.track for axle in (front, rear) for side in (1.0, -1.0)])
+    return plane_on_wheels(x, y, np.array(heights)).tolist()
 
 
 def _acceleration_against_speed(run: Run) -> list[Finding]:
