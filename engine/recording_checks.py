@@ -152,9 +152,9 @@ def _rest_values(run: Run, vehicle: Vehicle) -> list[str]:
 def _plane(vehicle: Vehicle, heights: list[np.floating]) -> list[float]:
     """z, pitch and roll of a vehicle's body on four wheel centres' heights, m."""
     front, rear = vehicle.front, vehicle.rear
-    x = np.repeat([front.cg_distance, -rear.cg_distance], 2)
+    x = np.array([front.cg_distance] * 2 + [-rear.cg_distance] * 2)
     y = np.array([side * 0.5 * axle.track for axle in (front, rear) for side in (1.0, -1.0)])
-    return plane_on_wheels(x, y, np.array(heights)).tolist()
+    return plane_on_wheels(x, y, np.array(heights, dtype=np.float64)).tolist()
 
 
 def _acceleration_against_speed(run: Run) -> list[Finding]:
