@@ -30,16 +30,8 @@ router = job_router("validations", VIEW)
 async def submit(sid: SessionId, services: Shared, body: ValidationRequest) -> dict[str, Any]:
     """Queue a validation of an identification; the same `key` again gives the same job."""
     services.warmup.require()
-    return await services.interactive.run(
-        sid,
-        lambda: submitted(
-            services,
-            sid,
-            VIEW,
-            key=body.key,
-            asked=as_asked(body),
-            spec=lambda: _spec(services, sid, body),
-        ),
+    return await submitted(
+        services, sid, VIEW, body.key, lambda: as_asked(body), lambda: _spec(services, sid, body)
     )
 
 
