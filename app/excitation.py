@@ -4,6 +4,7 @@ Imported with the first of them, because it brings numba and scipy.
 """
 
 from dataclasses import replace
+from difflib import get_close_matches
 from typing import Literal
 
 from ..engine.channels import Run
@@ -73,12 +74,13 @@ def manoeuvre_of(request: ExcitationForm) -> Manoeuvre:
 
 
 def known_manoeuvre(key: str) -> Manoeuvre:
-    """The manoeuvre that comes along under a key; NotFound lists the keys."""
-    try:
-        return reference_manoeuvres()[key]
-    except KeyError:
-        known = ", ".join(reference_manoeuvres())
-        raise NotFound(f"There is no manoeuvre by that key; there are {known}.") from None
+    """The manoeuvre that comes along under a key; NotFound names the nearest, or all."""
+    known = reference_manoeuvres()
+    if key in known:
+        return known[key]
+    near = get_close_matches(key, known, n=1)
+    hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}."
+    raise NotFound(f"There is no manoeuvre by that key; {hint}")
 
 
 def recording_in(

@@ -12,6 +12,7 @@ from fastapi import FastAPI
 from fastapi.staticfiles import StaticFiles
 
 from . import (
+    routes_campaigns,
     routes_catalogue,
     routes_identifications,
     routes_measurements,
@@ -21,6 +22,8 @@ from . import (
     routes_sweeps,
     routes_validations,
 )
+from .campaign_job import KIND as CAMPAIGN
+from .campaign_job import campaign
 from .cluster import Cluster
 from .guard import Guard
 from .identification_job import KIND as IDENTIFICATION
@@ -83,6 +86,7 @@ def create_app(
         routes_identifications,
         routes_sweeps,
         routes_validations,
+        routes_campaigns,
         routes_page,
     ):
         app.include_router(part.router)
@@ -112,6 +116,7 @@ def _services(
             store,
             Cluster(settings.cluster, store.directory.scratch),
             {
+                CAMPAIGN: campaign(),
                 IDENTIFICATION: identification(store, recordings),
                 SWEEP: sweep(store, recordings),
                 VALIDATION: validation(store, recordings),

@@ -15,7 +15,7 @@ from ..engine.errors import MeasurementError
 from ..engine.remembered import Remembered
 from ..engine.rims_settings import RimsSettings
 from ..engine.run_notes import doubtful_noise
-from .store import Measurement, Store
+from .store import Measurement, NewMeasurement, Store
 
 if TYPE_CHECKING:
     from ..engine.recorded_motion import RecordedMotion
@@ -81,6 +81,12 @@ def parse(data: bytes, name: str, noise: Mapping[str, float] | None = None) -> R
             f"{name}: the file is too large or too deep to read ({type(error).__name__}); "
             "send a plain CSV."
         ) from None
+
+
+def recorded(data: bytes, name: str, noise: Mapping[str, float] | None = None) -> NewMeasurement:
+    """A measurement file as it is kept; arguments and errors as of `parse`."""
+    run = parse(data, name, noise)
+    return NewMeasurement(name, data, summary(run), dict(run.noise))
 
 
 def with_braking(run: Run, intervals: Iterable[tuple[float, float]] | None) -> Run:

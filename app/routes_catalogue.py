@@ -24,6 +24,7 @@ from ..engine.run_notes import DEFAULT_NOISE
 from ..engine.vehicle import numbers
 from ..engine.vehicle_file import reference_vehicles, vehicle_to_json
 from .errors import NotFound
+from .plants import PLANTS
 from .schemas import RimsSettingsForm, RoadPreview, StartValues
 from .strict_json import StrictRoute
 
@@ -121,6 +122,16 @@ def manoeuvre(key: str) -> dict[str, Any]:
     from .excitation import known_manoeuvre
 
     return manoeuvre_to_json(known_manoeuvre(key))
+
+
+@router.get("/plants")
+def plants() -> list[dict[str, Any]]:
+    """The cars that a campaign can drive."""
+    shown = ("name", "takes_vehicle")
+    return [
+        {"key": key, **{field: getattr(one, field) for field in shown}}
+        for key, one in PLANTS.items()
+    ]
 
 
 @router.get("/roads")

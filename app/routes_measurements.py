@@ -12,10 +12,10 @@ from ..engine.errors import MeasurementError
 from ..engine.run_notes import parse_notes
 from . import frames
 from .access import SessionId
-from .recordings import parse, summary
+from .recordings import parse, recorded, summary
 from .routes_simulations import FORMS, csv_reply, frames_reply
 from .services import Services, Shared
-from .store import Measurement, NewMeasurement
+from .store import Measurement
 from .strict_json import StrictRoute
 from .uploads import Upload, openapi, receive
 
@@ -51,9 +51,7 @@ async def upload(sid: SessionId, services: Shared, received: Recording) -> dict[
 
 def _keep(services: Services, sid: str, received: Upload) -> Measurement:
     data = received.read(services.settings.limits.upload_bytes)
-    run = parse(data, received.name)
-    new = NewMeasurement(received.name, data, summary(run), dict(run.noise))
-    return services.store.add_measurement(sid, new)
+    return services.store.add_measurement(sid, recorded(data, received.name))
 
 
 @router.get("")

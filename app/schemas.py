@@ -26,6 +26,7 @@ from ..engine.step_limits import LONGEST_SAMPLE_STEP, LONGEST_STEP, SHORTEST_STE
 
 Number = Annotated[FiniteFloat, Strict()]
 Whole = Annotated[int, Strict()]
+Seed = Annotated[int, Strict(), Field(ge=0, le=2**53)]
 Flag = Annotated[bool, Strict()]
 JsonObject = Mapping[str, Any]
 Name = Annotated[str, StringConstraints(min_length=1, max_length=100)]
@@ -41,6 +42,15 @@ def _key_or_object(value: Any) -> Any:
     """One refusal in place of one for each member of a union."""
     if not isinstance(value, str | Mapping):
         raise PydanticCustomError("manoeuvre", "give a known manoeuvre's key or an object")
+    return value
+
+
+def _keys_or_object(value: Any) -> Any:
+    """As `_key_or_object`, of several manoeuvres."""
+    if not isinstance(value, list | Mapping):
+        raise PydanticCustomError(
+            "manoeuvres", "give a list of known manoeuvres' keys, or an object by name"
+        )
     return value
 
 
@@ -151,7 +161,7 @@ class SampledForm(WireForm):
     kind: Literal["sobol", "latin-hypercube"]
     ranges: Annotated[dict[Name, tuple[Number, Number]], Field(max_length=200)]
     cars: Whole
-    seed: Annotated[Whole, Field(ge=0, le=2**53)] = 0
+    seed: Seed = 0
 
 
 class SweepRequest(ExcitationForm):
@@ -162,13 +172,42 @@ class SweepRequest(ExcitationForm):
     key: Name | None = None
 
 
+Manoeuvres = Annotated[
+    Annotated[dict[Name, KeyOrObject], Field(max_length=50), Tag("named")]
+    | Annotated[list[Name], Field(max_length=50), Tag("known")],
+    Discriminator(lambda value: "known" if isinstance(value, list) else "named"),
+    BeforeValidator(_keys_or_object),
+]
+
+
+class CampaignRequest(WireForm):
+    """Let a car that is known drive manoeuvres while virtual sensors record.
+
+    manoeuvres : keys of known ones, or by the recording's name a key or an object; the usual ones
+    class_factor, band (cycle/m), road_seed : of every random road among them
+    noise : standard deviation by channel of the usual sensors, SI;  sensors : in their place
+    """
+
+    plant: Name = "concept"
+    vehicle: JsonObject | None = None
+    manoeuvres: Manoeuvres | None = None
+    class_factor: Number | None = None
+    band: tuple[Number, Number] | None = None
+    road_seed: Seed | None = None
+    noise: Annotated[dict[Name, Annotated[Number, Field(ge=0, le=1e6)]], Field(max_length=50)] = {}
+    sensors: JsonObject | None = None
+    seed: Seed = 0
+    format: Literal["csv", "mf4"] = "csv"
+    key: Name | None = None
+
+
 class RoadPreview(WireForm):
     """A road as a manoeuvre would build it, seen from above the car at rest."""
 
     road: JsonObject
     length: Annotated[Number, Field(gt=0, le=20_000)] = 200.0
     torque_end: Annotated[Number, Field(ge=0, le=20_000)] = 100.0
-    seed: Annotated[Whole, Field(ge=0, le=2**53)] = 0
+    seed: Seed = 0
     points: Annotated[Whole, Field(ge=2, le=20_000)] = 2000
 
 

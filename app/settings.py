@@ -39,6 +39,7 @@ class Limits:
     identified_samples: int = 400_000
     swept_cars: int = 100_000
     swept_steps: int = 2_000_000_000
+    driven_seconds: float = 600.0
 
 
 @dataclass(frozen=True, kw_only=True)

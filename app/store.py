@@ -10,7 +10,7 @@ import json
 import secrets
 import threading
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -172,16 +172,25 @@ class Store:
 
     def add_measurement(self, session: str, new: NewMeasurement) -> Measurement:
         """Keep an original and what was found in it; `Busy` where the session is full."""
+        return self.add_measurements(session, [new])[0]
+
+    def add_measurements(self, session: str, new: Sequence[NewMeasurement]) -> list[Measurement]:
+        """Keep all of them in their order, or `Busy` and none."""
         with self._originals, self.database.writing() as connection:
             count = connection.execute(
                 select(func.count()).where(measurements.c.session == session)
             ).scalar_one()
-            if count >= self.limits.session_measurements:
-                raise Busy(f"The session already holds {count} measurements; delete one first.")
-            self._require_room(connection, session, len(new.data))
-            measurement = self._insert(connection, session, new, time.time())
+            if count + len(new) > (most := self.limits.session_measurements):
+                remedy = f"delete {'one' if count + len(new) == most + 1 else 'some'} first."
+                raise Busy(f"The session already holds {count} measurements of {most}; {remedy}")
+            self._require_room(connection, session, sum(len(one.data) for one in new))
+            now = time.time()
+            added = [
+                self._insert(connection, session, one, now + 1e-3 * order)
+                for order, one in enumerate(new)
+            ]
             connection.execute(update(sessions).where(sessions.c.id == session).values(used=True))
-        return self.measurement(session, measurement)
+        return [self.measurement(session, one) for one in added]
 
     def _insert(self, connection: Any, session: str, new: NewMeasurement, now: float) -> str:
         sha256, measurement = self._keep(connection, new.data, now), secrets.token_hex(8)

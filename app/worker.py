@@ -1,10 +1,10 @@
 """What runs inside a job worker: one task at a time, at the lowest priority, able to stop.
 
 A task is a function of (payload, report, cancelled); it gives its result, with a file if it makes
-one. It is told to stop through a flag in this
-module, set by the worker's event loop while the task computes; it reports through the scheduler's
-event log, at most ten times a second, and always the whole progress, so nothing depends on the
-order or number of reports.
+one, or raises CutShort with what it had finished when it was cancelled. It is told to stop through
+a flag in this module, set by the worker's event loop while the task computes; it reports through
+the scheduler's event log, at most ten times a second, and always the whole progress, so nothing
+depends on the order or number of reports.
 """
 
 import os
@@ -29,6 +29,14 @@ class WithFile:
 
     result: dict[str, Any]
     file: bytes
+
+
+class CutShort(Cancelled):
+    """The task was cancelled; what it had finished by then is kept."""
+
+    def __init__(self, kept: WithFile):
+        super().__init__("Cancelled; what was finished is kept.")
+        self.kept = kept
 
 
 Task = Callable[[Any, Report, Callable[[], bool]], dict[str, Any] | WithFile]
@@ -74,6 +82,8 @@ def run(name: str, task: Task, payload: Any) -> Ending:
         if isinstance(found, WithFile):
             return {**ending("done", result=found.result), "file": found.file}
         return ending("done", result=found)
+    except CutShort as stopped:
+        return {**ending("cancelled", result=stopped.kept.result), "file": stopped.kept.file}
     except Cancelled:
         return ending("cancelled")
     except RideError as error:

@@ -1,0 +1,203 @@
+"""A campaign as a background job: what goes to the worker, what the worker does, what comes back.
+
+The worker gets everything by value and gives the files back as one archive, so it needs neither the
+database nor the data directory and may be another machine.
+"""
+
+import hashlib
+import io
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
+
+from .errors import InvalidRequest, OverBudget
+from .job_store import Job
+from .jobs import Kind, digest
+from .plants import known_plant
+from .schemas import CampaignRequest
+from .settings import Limits
+from .worker import CutShort, Report, WithFile
+
+if TYPE_CHECKING:
+    from ..engine.campaign import Campaign, Recording
+
+KIND = "campaign"
+
+NAME = re.compile(r"[A-Za-z0-9_-]{1,60}")
+"""What a recording may be called: it becomes a file's name."""
+
+VALUE_BYTES = 25
+"""What a value takes in a recording, at most."""
+
+FRAME_BYTES = 200_000
+"""What the files take besides, a recording: notes and the manoeuvre."""
+
+
+def campaign() -> Kind:
+    """The job kind; all that it needs is in its spec."""
+
+    def payload(job: Job) -> dict[str, Any]:
+        return job.spec
+
+    return Kind(task=drive_manoeuvres, payload=payload)
+
+
+def as_asked(request: CampaignRequest) -> str:
+    """What stands for a request: the same whenever it is sent."""
+    return digest(request.model_dump(mode="json", exclude={"key"}))
+
+
+def check_and_fill(
+    request: CampaignRequest, vehicle: Mapping[str, Any], limits: Limits
+) -> dict[str, Any]:
+    """Everything that the job needs, checked, with what holds untold filled in.
+
+    vehicle : of the session, where the request has none
+    """
+    from ..engine.campaign import CAMPAIGN, roughened
+    from ..engine.manoeuvre import manoeuvre_to_json
+    from ..engine.mdf4 import require_asammdf
+    from ..engine.vehicle_file import vehicle_to_json
+
+    known = known_plant(request.plant, with_vehicle=request.vehicle is not None)
+    if request.noise and request.sensors is not None:
+        raise InvalidRequest(
+            "noise and sensors both tell the noise; leave out noise.", field="noise"
+        )
+    if request.format == "mf4":
+        require_asammdf()
+    chosen = _chosen(CAMPAIGN if request.manoeuvres is None else request.manoeuvres)
+    changed = roughened(chosen, request.class_factor, request.band, request.road_seed)
+    spec = request.model_dump(mode="json", exclude={"key"})
+    spec |= {
+        "vehicle": vehicle if request.vehicle is None else request.vehicle,
+        "manoeuvres": {key: manoeuvre_to_json(one) for key, one in changed.items()},
+        "date": datetime.now(UTC).replace(microsecond=0).isoformat(),
+    }
+    planned = _planned(spec)
+    _check_budget(planned, limits)
+    car = vehicle_to_json(planned.plant.vehicle) if known.takes_vehicle else None
+    return {**spec, "vehicle": car, "most_bytes": most_bytes(planned)}
+
+
+def _chosen(asked: Iterable[str] | Mapping[str, Any]) -> dict[str, Any]:
+    """The engine's manoeuvres by key."""
+    from ..engine.manoeuvre import manoeuvre_from_json
+    from .excitation import known_manoeuvre
+
+    if not isinstance(asked, Mapping):
+        listed = list(asked)
+        if twice := {key for key in listed if listed.count(key) > 1}:
+            raise InvalidRequest(
+                f"manoeuvres names {min(twice)[:60]} twice; name it once.", field="manoeuvres"
+            )
+        return {key: known_manoeuvre(key) for key in listed}
+    for key in asked:
+        if not NAME.fullmatch(key):
+            raise InvalidRequest(
+                "manoeuvres has a name that makes no file's name; take 1 to 60 letters, digits,"
+                " - and _.",
+                field="manoeuvres",
+            )
+    return {
+        key: known_manoeuvre(one) if isinstance(one, str) else manoeuvre_from_json(one, key)
+        for key, one in asked.items()
+    }
+
+
+def _planned(spec: Mapping[str, Any]) -> "Campaign":
+    """The engine's campaign; raises what a person can mend."""
+    from ..engine.campaign import Campaign
+    from ..engine.manoeuvre import manoeuvre_from_json
+    from ..engine.sensor_file import noisy, sensors_from_json
+
+    sensors = (
+        noisy(spec["noise"], "noise")
+        if spec["sensors"] is None
+        else sensors_from_json(spec["sensors"])
+    )
+    driven = {key: manoeuvre_from_json(one, key) for key, one in spec["manoeuvres"].items()}
+    plant = known_plant(spec["plant"]).make(spec["vehicle"])
+    return Campaign.plan(plant, sensors, driven, spec["seed"])
+
+
+def _check_budget(planned: "Campaign", limits: Limits) -> None:
+    """Refuse drives that together are longer than a campaign over REST takes."""
+    if planned.seconds > limits.driven_seconds:
+        raise OverBudget(
+            f"The manoeuvres last {planned.seconds:g} s together, a campaign over REST takes at"
+            f" most {limits.driven_seconds:g} s; leave some out or shorten them, or use the command"
+            " ridetune campaign."
+        )
+
+
+def most_bytes(planned: "Campaign") -> int:
+    """How large the files can become together."""
+    samples = planned.seconds * planned.sensors.rate_hz + len(planned.manoeuvres)
+    values = samples * (1 + len(planned.sensors.sensors))
+    return FRAME_BYTES * (1 + len(planned.manoeuvres)) + round(VALUE_BYTES * values)
+
+
+def drive_manoeuvres(payload: Any, report: Report, cancelled: Callable[[], bool]) -> WithFile:
+    """On the worker: drive, reporting how far it is; all files as one archive.
+
+    Raises CutShort with the drives that had ended when it was cancelled.
+    """
+    from ..engine.campaign_run import drive
+    from ..engine.errors import Cancelled
+
+    planned = _planned(payload)
+    kept: list[Recording] = []
+    try:
+        for recording in drive(
+            planned, processes=1, progress=lambda now: report(asdict(now)), cancelled=cancelled
+        ):
+            kept.append(recording)
+    except Cancelled:
+        raise CutShort(_archived(planned, kept, payload)) from None
+    return _archived(planned, kept, payload)
+
+
+def _archived(
+    planned: "Campaign", kept: "Iterable[Recording]", payload: Mapping[str, Any]
+) -> WithFile:
+    """All files, and what became of each drive."""
+    from ..engine.recording_files import files_of, files_of_car
+
+    form, date = payload["format"], datetime.fromisoformat(payload["date"])
+    files, ended = files_of_car(planned), {one.name: one for one in kept}
+    for recording in ended.values():
+        files |= files_of(recording, planned, form, date)
+    stream = io.BytesIO()
+    with ZipFile(stream, "w") as archive:
+        for name, data in files.items():
+            entry = ZipInfo(name, date.timetuple()[:6])
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, data, ZIP_DEFLATED)
+    listed = {
+        name: {"name": name, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+        for name, data in files.items()
+    }
+    recordings = [_became(name, ended.get(name), listed, form) for name in planned.manoeuvres]
+    return WithFile({"recordings": recordings, "files": list(listed.values())}, stream.getvalue())
+
+
+def _became(
+    name: str, recording: "Recording | None", listed: Mapping[str, Any], form: str
+) -> dict[str, Any]:
+    """What became of one drive: whole, the part before it broke off, or missing, and why."""
+    if recording is None:
+        failure = "The campaign was cancelled before this drive ended."
+        return {"name": name, "state": "missing", "failure": failure, "file": None, "sha256": None}
+    state = "missing" if recording.run is None else "partial" if recording.failure else "whole"
+    file = listed.get(f"{name}.partial.{form}" if state == "partial" else f"{name}.{form}")
+    return {
+        "name": name,
+        "state": state,
+        "failure": recording.failure,
+        "file": file and file["name"],
+        "sha256": file and file["sha256"],
+    }

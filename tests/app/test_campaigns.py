@@ -1,0 +1,312 @@
+"""Campaigns over REST: from the request to the recordings, by the real engine on real workers."""
+
+import io
+import json
+import time
+import zipfile
+
+import pytest
+from ridetune.app.campaign_job import drive_manoeuvres
+from ridetune.app.settings import Limits, Settings
+from ridetune.app.worker import CutShort
+from ridetune.engine.campaign import CAMPAIGN, Campaign, chosen, roughened
+from ridetune.engine.campaign_run import drive
+from ridetune.engine.manoeuvre import manoeuvre_to_json, reference_manoeuvres
+from ridetune.engine.measurement import run_to_csv
+from ridetune.engine.plant import ConceptPlant
+from ridetune.engine.sensor_file import noisy
+from ridetune.engine.vehicle_file import reference_vehicles, vehicle_to_json
+
+from .conftest import Visitor, open_client
+from .test_jobs import StandIn
+
+PATIENCE = 120.0
+CAR = reference_vehicles()["paper"]
+PAPER = vehicle_to_json(CAR)
+NOISE = {"chassis.z": 1e-3, "wheel.fl.z": 2e-4}
+SHORT = {"vehicle": PAPER, "manoeuvres": ["bump", "brake-54"], "noise": NOISE, "seed": 5}
+BUMP = manoeuvre_to_json(reference_manoeuvres()["bump"])
+
+
+@pytest.fixture(scope="module")
+def engineer(tmp_path_factory):
+    """A session on a service with workers of its own."""
+    with open_client(Settings(data=tmp_path_factory.mktemp("campaigns"))) as client:
+        yield Visitor(client)
+
+
+def submit(visitor: Visitor, **asked) -> dict:
+    reply = visitor.post("/campaigns", json={**SHORT, **asked})
+    assert reply.status_code == 202, reply.text
+    return reply.json()
+
+
+def wait_for(visitor: Visitor, job: str, *states: str) -> dict:
+    deadline = time.monotonic() + PATIENCE
+    while True:
+        kept = visitor.get(f"/campaigns/{job}").json()
+        if kept["state"] in states:
+            return kept
+        assert time.monotonic() < deadline, kept
+        time.sleep(0.05)
+
+
+@pytest.fixture(scope="module")
+def done(engineer) -> dict:
+    """A campaign that is done."""
+    ended = wait_for(engineer, submit(engineer)["id"], "done", "failed")
+    assert ended["state"] == "done", ended["error"]
+    return ended
+
+
+def text(visitor: Visitor, job: dict, name: str) -> str:
+    reply = visitor.get(f"/campaigns/{job['id']}/files/{name}")
+    assert reply.status_code == 200, reply.text
+    return reply.text
+
+
+def by_engine(**told) -> dict[str, str]:
+    """CSV by recording, of the engine called directly."""
+    driven = roughened(chosen(["bump", "brake-54"]), **told)
+    campaign = Campaign.plan(ConceptPlant(CAR), noisy(NOISE, "noise"), driven, 5)
+    return {one.name: run_to_csv(one.run) for one in drive(campaign, processes=1) if one.run}
+
+
+def test_the_recordings_are_those_of_the_engine(engineer, done):
+    """Oracle: the engine called directly, with the same seed."""
+    assert [one["state"] for one in done["result"]["recordings"]] == ["whole", "whole"]
+    for name, recording in by_engine().items():
+        assert text(engineer, done, f"{name}.csv") == recording
+    assert json.loads(text(engineer, done, "truth.json"))["vehicle"] == PAPER == done["vehicle"]
+
+
+def test_the_random_roads_are_those_that_are_asked_for(engineer, done):
+    """Oracle: the engine called directly. The bump is no random road."""
+    told = {"class_factor": 0.5, "band": [0.05, 2.0], "road_seed": 9}
+    ended = wait_for(engineer, submit(engineer, **told)["id"], "done", "failed")
+    expected = by_engine(class_factor=0.5, band=(0.05, 2.0), seed=9)
+    for name, recording in expected.items():
+        assert text(engineer, ended, f"{name}.csv") == recording
+    same = [text(engineer, ended, f"{n}.csv") == text(engineer, done, f"{n}.csv") for n in expected]
+    assert same == [True, False]
+
+
+def test_what_a_campaign_shows_repeats_it(engineer, done):
+    """Oracle: the recordings of the first. The session's car has changed in between."""
+    assert engineer.put("/vehicle", json={**PAPER, "name": "another"}).status_code == 200
+    fields = ("plant", "vehicle", "manoeuvres", "class_factor", "band", "road_seed")
+    fields += ("noise", "sensors", "seed", "format")
+    again = submit(engineer, **{name: done[name] for name in fields})
+    again = wait_for(engineer, again["id"], "done", "failed")
+    assert again["result"]["recordings"] == done["result"]["recordings"]
+
+
+def test_untold_the_session_s_car_drives_the_usual_manoeuvres_on_ideal_sensors(visitor):
+    """The request is not driven here; what it stands for is shown at once."""
+    job = visitor.post("/campaigns", json={}).json()
+    assert list(job["manoeuvres"]) == list(CAMPAIGN)
+    assert (job["plant"], job["noise"], job["sensors"], job["format"]) == (
+        "concept",
+        {},
+        None,
+        "csv",
+    )
+    car = visitor.get(f"/campaigns/{job['id']}").json()["vehicle"]
+    assert car == visitor.get("/vehicle").json()
+    assert visitor.post(f"/campaigns/{job['id']}/cancel").status_code == 202
+
+
+def test_progress_counts_drives_and_events_end_with_the_last_state(engineer, done):
+    progress = done["progress"]
+    assert [progress[name] for name in ("runs", "of", "failed")] == [2, 2, 0]
+    assert progress["driven"] == progress["duration"] == 16.0
+    events = engineer.get(f"/campaigns/{done['id']}/events").text
+    assert '"state":"done"' in events.replace(" ", "")
+
+
+def test_the_archive_holds_the_files_that_are_listed(engineer, done):
+    listed = engineer.get(f"/campaigns/{done['id']}/files").json()
+    reply = engineer.get(f"/campaigns/{done['id']}/campaign.zip")
+    with zipfile.ZipFile(io.BytesIO(reply.content)) as archive:
+        assert archive.namelist() == [one["name"] for one in listed]
+        assert {one["name"]: one["bytes"] for one in listed} == {
+            one.filename: one.file_size for one in archive.infolist()
+        }
+        for name in archive.namelist():
+            assert archive.read(name).decode() == text(engineer, done, name)
+    assert {"vehicle.json", "truth.json", "manoeuvre_bump.csv", "manoeuvre_bump.toml"} <= {
+        one["name"] for one in listed
+    }
+    strange = engineer.get(f"/campaigns/{done['id']}/files/other.csv")
+    assert (strange.status_code, "no file by that name" in strange.text) == (404, True)
+    stranger = Visitor(engineer.client)
+    assert stranger.get(f"/campaigns/{done['id']}/campaign.zip").status_code == 404
+
+
+def test_recordings_become_measurements_once(engineer, done):
+    """With the noise that was put on them, and byte for byte."""
+    before = engineer.get("/measurements").json()
+    reply = engineer.post(f"/campaigns/{done['id']}/measurements")
+    assert reply.status_code == 201, reply.text
+    taken = reply.json()
+    assert [one["name"] for one in taken] == ["manoeuvre_bump.csv", "manoeuvre_brake-54.csv"]
+    assert all(one["noise"] == NOISE and one["usable_for_identification"] for one in taken)
+    original = engineer.get(f"/measurements/{taken[0]['id']}/original")
+    assert original.text == text(engineer, done, "manoeuvre_bump.csv")
+    assert engineer.post(f"/campaigns/{done['id']}/measurements").json() == taken
+    assert len(engineer.get("/measurements").json()) == len(before) + 2
+
+
+def test_recordings_that_do_not_all_fit_are_not_taken_over(tmp_path):
+    limits = Limits(session_measurements=3)
+    with open_client(Settings(data=tmp_path, limits=limits)) as client:
+        visitor = Visitor(client)
+        job = wait_for(visitor, submit(visitor)["id"], "done", "failed")
+        refused = visitor.post(f"/campaigns/{job['id']}/measurements")
+        assert (refused.status_code, "delete one first" in refused.text) == (429, True)
+        assert len(visitor.get("/measurements").json()) == 2
+
+
+def test_mdf4_comes_as_a_file_but_is_not_read_back(engineer):
+    job = wait_for(engineer, submit(engineer, format="mf4")["id"], "done", "failed")
+    file = engineer.get(f"/campaigns/{job['id']}/files/manoeuvre_bump.mf4")
+    assert file.content.startswith(b"MDF     4.1")
+    refused = engineer.post(f"/campaigns/{job['id']}/measurements")
+    assert (refused.status_code, "format csv" in refused.text) == (409, True)
+
+
+def test_own_manoeuvres_and_sensors(engineer):
+    """Names are the caller's; what the sensors list is recorded and nothing else."""
+    asked = {
+        "manoeuvres": {"mine": {**BUMP, "duration": 2.0}, "known": "bump"},
+        "noise": {},
+        "sensors": {"rate_hz": 100, "sensors": {"chassis.z": {"noise": 1e-3}}},
+    }
+    job = wait_for(engineer, submit(engineer, **asked)["id"], "done", "failed")
+    assert [one["file"] for one in job["result"]["recordings"]] == [
+        "manoeuvre_mine.csv",
+        "manoeuvre_known.csv",
+    ]
+    lines = text(engineer, job, "manoeuvre_mine.csv").splitlines()
+    assert (lines[0], len(lines)) == ("time [s],chassis.z [m]", 202)
+
+
+def test_a_cancelled_campaign_keeps_what_had_ended(done):
+    """In the worker's task; the second drive had not begun when it was told to stop."""
+    asked = {**done, "noise": NOISE, "sensors": None}
+    runs = []
+    with pytest.raises(CutShort) as stopped:
+        drive_manoeuvres(asked, lambda now: runs.append(now["runs"]), lambda: 1 in runs)
+    whole, missing = stopped.value.kept.result["recordings"]
+    assert (whole["name"], whole["state"]) == ("manoeuvre_bump", "whole")
+    assert (missing["state"], missing["file"]) == ("missing", None)
+    assert "cancelled" in missing["failure"]
+    with zipfile.ZipFile(io.BytesIO(stopped.value.kept.file)) as archive:
+        assert whole["file"] in archive.namelist()
+
+
+def test_a_running_campaign_has_no_files_until_it_is_cancelled(engineer):
+    """Thirty drives of 20 s take seconds."""
+    long = {f"drive-{k}": "1" for k in range(30)}
+    job = submit(engineer, manoeuvres=long)["id"]
+    wait_for(engineer, job, "running")
+    early = engineer.get(f"/campaigns/{job}/files")
+    assert (early.status_code, "wait until it has ended" in early.text) == (409, True)
+    deadline = time.monotonic() + PATIENCE
+    while not engineer.get(f"/campaigns/{job}").json()["progress"].get("runs"):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    assert engineer.post(f"/campaigns/{job}/cancel").status_code == 202
+    ended = wait_for(engineer, job, "cancelled", "done", "failed")
+    assert ended["state"] == "cancelled", ended["error"]
+    states = [one["state"] for one in ended["result"]["recordings"]]
+    whole = states.count("whole")
+    assert 0 < whole < 30
+    assert states == ["whole"] * whole + ["missing"] * (30 - whole)
+    taken = engineer.post(f"/campaigns/{job}/measurements").json()
+    assert len(taken) == whole
+    assert engineer.delete(f"/campaigns/{job}").status_code == 204
+    assert engineer.get(f"/campaigns/{job}/files").status_code == 404
+
+
+REFUSED = {
+    "unknown plant": ({"plant": "concpt"}, "did you mean concept?"),
+    "another plant": ({"plant": "lorry"}, "there is concept"),
+    "unknown manoeuvre": ({"manoeuvres": ["brake-55"]}, "did you mean brake-54?"),
+    "no manoeuvre": ({"manoeuvres": []}, "has no manoeuvre"),
+    "a manoeuvre twice": ({"manoeuvres": ["1", "1"]}, "names 1 twice"),
+    "a rig": ({"manoeuvres": ["heave"]}, "moves the posts of a rig"),
+    "a text for manoeuvres": ({"manoeuvres": "1"}, "field manoeuvres is refused: give a list"),
+    "a number for a manoeuvre": ({"manoeuvres": {"a": 1}}, "field manoeuvres.a is refused: give a"),
+    "a path for a name": ({"manoeuvres": {"../a": "1"}}, "1 to 60 letters, digits, - and _"),
+    "misspelt key of a manoeuvre": (
+        {"manoeuvres": {"a": {**BUMP, "sed": 1}}},
+        'did you mean "seed"',
+    ),
+    "negative noise": ({"noise": {"chassis.z": -1e-3}}, "field noise.chassis.z is refused: input"),
+    "noise of nothing": ({"noise": {"chassis.zz": 1e-3}}, "which is not recorded"),
+    "noise twice": ({"sensors": {}}, "leave out noise"),
+    "negative noise of a sensor": (
+        {"noise": {}, "sensors": {"sensors": {"chassis.z": {"noise": -1}}}},
+        "sensors.chassis.z.noise is -1, but must lie",
+    ),
+    "negative class factor": ({"class_factor": -1}, "class_factor is -1"),
+    "crossed band": ({"band": [2, 1]}, "band"),
+    "half a band": ({"band": [2]}, "field band.1 is missing"),
+    "no random road": ({"manoeuvres": ["bump"], "class_factor": 0.5}, "has a random road"),
+    "negative seed": ({"seed": -1}, "field seed is refused"),
+    "a fraction of a seed": ({"road_seed": 0.5}, "field road_seed is refused"),
+    "unknown format": ({"format": "mat"}, "field format is refused"),
+    "a misspelt field": ({"sensor": {}}, "field sensor is not known here"),
+    "no car": ({"vehicle": {}}, "name is missing"),
+    "too long": ({"manoeuvres": {f"d{k}": "1" for k in range(31)}}, "620 s together"),
+    "too much": (
+        {
+            "noise": {},
+            "manoeuvres": {f"d{k}": "1" for k in range(30)},
+            "sensors": {
+                "rate_hz": 400,
+                "points": {f"point.p{k}": [0, 0, 0] for k in range(99)},
+                "sensors": {f"point.p{k}.a_z": {} for k in range(99)},
+            },
+        },
+        "500 MB together",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_campaign_that_cannot_be_is_refused_before_it_is_queued(engineer, name):
+    more, told = REFUSED[name]
+    before = engineer.get("/campaigns").json()
+    reply = engineer.post("/campaigns", json={**SHORT, **more})
+    assert reply.status_code in (404, 422, 429), reply.text
+    assert told in reply.json()["detail"]
+    assert engineer.get("/campaigns").json() == before
+
+
+def test_a_drive_that_diverges_is_kept_as_far_as_it_came(engineer):
+    """A tyre a hundred times too stiff for the step."""
+    car = json.loads(json.dumps(PAPER))
+    car["front"]["tyre"]["stiffness"] = car["rear"]["tyre"]["stiffness"] = 4e7
+    job = wait_for(engineer, submit(engineer, vehicle=car)["id"], "done", "failed")
+    for one in job["result"]["recordings"]:
+        assert one["state"] != "whole"
+        assert one["failure"].endswith(".")
+    refused = engineer.post(f"/campaigns/{job['id']}/measurements")
+    assert (refused.status_code, "no whole recording" in refused.text) == (409, True)
+
+
+def test_the_same_key_drives_once(tmp_path, monkeypatch):
+    monkeypatch.setattr("ridetune.app.main.Cluster", StandIn)
+    with open_client(Settings(data=tmp_path)) as client:
+        visitor = Visitor(client)
+        first = submit(visitor, key="click-1")
+        assert submit(visitor, key="click-1") == first
+        other = visitor.post("/campaigns", json={**SHORT, "seed": 6, "key": "click-1"})
+        assert (other.status_code, other.json()["field"]) == (422, "key")
+
+
+def test_the_plants_are_listed(client):
+    plants = client.get("/api/plants").json()
+    assert plants[0] == {"key": "concept", "name": "Concept car", "takes_vehicle": True}
