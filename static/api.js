@@ -92,6 +92,7 @@ export const channels = () => json("GET", "/api/channels");
 export const vehicles = () => json("GET", "/api/vehicles");
 export const referenceVehicle = (key) => json("GET", `/api/vehicles/${encodeURIComponent(key)}`);
 export const manoeuvres = () => json("GET", "/api/manoeuvres");
+export const plants = () => json("GET", "/api/plants");
 export const roads = () => json("GET", "/api/roads");
 export const rimsSettings = () => json("GET", "/api/rims-settings");
 
@@ -143,8 +144,19 @@ export const cancelValidation = (id) => json("POST", `${base}/validations/${id}/
 export const validationDocument = (id) => json("GET", `${base}/validations/${id}/result.json`);
 export const reportUrl = (id) => `${base}/validations/${id}/report.html`;
 
+// Campaigns
+export const driveCampaign = (body) => json("POST", `${base}/campaigns`, { body });
+export const campaign = (id) => json("GET", `${base}/campaigns/${id}`);
+export const campaigns = () => json("GET", `${base}/campaigns`);
+export const cancelCampaign = (id) => json("POST", `${base}/campaigns/${id}/cancel`);
+/** The whole recordings as measurements of the session. */
+export const takeOver = (id) => json("POST", `${base}/campaigns/${id}/measurements`);
+export const campaignUrl = (id) => `${base}/campaigns/${id}/campaign.zip`;
+export const campaignFileUrl = (id, name) =>
+  `${base}/campaigns/${id}/files/${encodeURIComponent(name)}`;
+
 /**
- * Follow a job of a kind ("identifications", "validations"): onProgress(progress), onState(job).
+ * Follow a job of a kind ("identifications", "validations", "campaigns"): onProgress(progress), onState(job).
  * Returns a function that stops following.
  */
 export function follow(kind, id, onProgress, onState) {

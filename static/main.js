@@ -5,9 +5,10 @@
 //
 // For the browser tests `window.ridetune` looks inside: state(key) of the store, timing (ms from a
 // slider's move to new charts), scene (connected, built, poses, last messages), drawn() (what each
-// chart shows), zoomed(), clock, job(), validation(), idle() (no simulation under way) and unsaved().
+// chart shows), zoomed(), clock, job(), validation(), campaign(), idle() (no simulation under way) and unsaved().
 
 import * as api from "./api.js";
+import * as campaign from "./campaign.js";
 import * as car from "./car.js";
 import * as charts from "./charts.js";
 import * as comfort from "./comfort.js";
@@ -38,14 +39,14 @@ async function start() {
   api.useSession(sid);
   set({ session: sid, online: true, ready: false, compare: "baseline", road: null, liftOff: false, fit: null, fitJob: null,
     now: null, reference: null, measured: null, traction: "exact", braking: {} });
-  const [session, parameters, channels, vehicles, manoeuvres, roads, rimsSettings] = await Promise.all([
-    api.session(), api.parameters(), api.channels(), api.vehicles(), api.manoeuvres(), api.roads(),
-    api.rimsSettings(),
+  const [session, parameters, channels, vehicles, manoeuvres, plants, roads, rimsSettings] = await Promise.all([
+    api.session(), api.parameters(), api.channels(), api.vehicles(), api.manoeuvres(), api.plants(),
+    api.roads(), api.rimsSettings(),
   ]);
   units.learn(channels, parameters);
   const { vehicle, measurements: rows } = session;
   const baseline = session.baseline ?? vehicle;
-  set({ parameters, vehicles, manoeuvres, roads, rimsSettings, vehicle, baseline, measurements: rows });
+  set({ parameters, vehicles, manoeuvres, plants, roads, rimsSettings, vehicle, baseline, measurements: rows });
   const usable = rows.find((row) => row.usable_for_identification);
   set({
     values: controls.valuesOf(vehicle),
@@ -57,6 +58,7 @@ async function start() {
   await settle();
   await identification.resume(session.identifications);
   await validation.resume();
+  await campaign.resume();
 }
 
 function build() {
@@ -71,7 +73,7 @@ function build() {
   charts.build(() => want("now", "reference"));
   comfort.build();
   measurements.build({
-    open: () => select("tab-measurements"), takeVehicle: car.load,
+    open: () => select("tab-measurements"), takeVehicle: car.load, campaign: campaign.build(),
   });
   identification.build({
     open: () => select("tab-identification"), apply: applyFit,
@@ -247,7 +249,7 @@ function lost(error) {
 window.ridetune = {
   state: get, timing, scene: scene.seen, drawn: charts.drawn, zoomed: charts.zoomed,
   clock: timeline.clock, job: identification.current,
-  validation: validation.current, idle, unsaved: () => unsaved || saving,
+  validation: validation.current, campaign: campaign.current, idle, unsaved: () => unsaved || saving,
 };
 
 start().catch(lost);

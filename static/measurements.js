@@ -21,14 +21,15 @@ const parts = {};
 
 export function build(callbacks) {
   hooks = callbacks;
-  parts.list = h("div", { className: "measurement-list scrolls" });
+  parts.list = h("div");
   parts.detail = h("div", { className: "measurement-detail scrolls" });
   parts.file = h("input", {
     type: "file", id: "file", multiple: true, accept: ".csv,.txt,.toml,text/csv", className: "hidden-file",
     "aria-label": "Measurement files",
     on: { change: () => { add([...parts.file.files]); parts.file.value = ""; } },
   });
-  $("#measurements").append(h("div", { className: "measurements" }, parts.list, parts.detail));
+  $("#measurements").append(h("div", { className: "measurements" },
+    h("div", { className: "measurement-list scrolls" }, parts.list, hooks.campaign), parts.detail));
   const drop = $("#drop");
   let depth = 0;
   const carriesFiles = (event) => event.dataTransfer?.types.includes("Files");
