@@ -6,7 +6,7 @@ forces, the joints' reactions among them,
     N^T (dr/dq) N y = (2 pi f)^2 N^T M N y,    shape = N y
 
 without damping: x, y, yaw and the wheels' spin are free and come out at 0 Hz. Reactions turn with
-the bodies: without their share in dr/dq yaw is not free and pitch is off by 4 %. Exudyn's own
+the bodies: without their share in dr/dq yaw is not free and pitch is off by 3.5 %. Exudyn's own
 stiffness matrix has no such share, so r is differenced.
 """
 

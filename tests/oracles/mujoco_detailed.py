@@ -1,201 +1,194 @@
-"""The detailed car a second time: MuJoCo's free bodies, every joint and force by hand.
+"""The detailed car a second time: a tree of MuJoCo's bodies and joints, forces written by hand.
 
-MuJoCo carries one free body a rigid group: attitudes, mass matrix and weight are its own. What the
-joints let happen and what every other element does is written out in the inertial frame. At rest
+Ideal joints are MuJoCo's hinges, slides and balls; what closes a loop (one ball joint of the front
+axle) is its `connect` constraint. MuJoCo carries attitudes, mass matrix, weight and the generalized
+forces f of everything else. With J of the closed loop, its reaction r and null space N, at rest
 
-    N^T f = 0,    N : motions that no joint hinders,    f : all forces but the joints'
+    N^T f = 0,    K = -N^T d(f + J^T r)/dq N,    M = N^T M_tree N
 """
 
 import mujoco
 import numpy as np
+from ridetune.engine.detailed.pose import rotation
 from ridetune.engine.detailed.rigid import frame_about, rigid_groups
 from ridetune.engine.frames import GRAVITY
-from scipy.linalg import null_space
+from scipy.linalg import eigh, null_space
+from scipy.spatial.transform import Rotation
+
+from .detailed_forces import DetailedForces, cross
+
+JOINT = mujoco.mjtJoint
+
+INCREMENT = 1e-6
+"""Of a unit motion in central differences."""
+
+STEP = 2e-4
+"""s: the stiffest bushing rings at 811 Hz."""
+
+
+def resting(model, q):
+    """The car where Exudyn's model has its groups, coordinates q (groups, 6)."""
+    car = MujocoDetailedCar(model.car)
+    frames = np.swapaxes(np.array(model.frames), 1, 2)
+    car.place(q[:, :3], rotation(q[:, 3:]) @ frames)
+    return car
 
 
 class MujocoDetailedCar:
-    """Free bodies with the car's forces on them."""
+    """The car's tree and the forces on it. `now` is x, R, v, w of the groups' CGs."""
 
     def __init__(self, car):
         self.car, self.groups = car, rigid_groups(car)
         self.index = {name: k for k, g in enumerate(self.groups) for name in g.names}
+        self.forces = DetailedForces(car, self.groups, self.index)
+        self.parents, closures = self._spanned()
         spec = mujoco.MjSpec()
         spec.option.gravity = [0.0, 0.0, -GRAVITY]
-        for group in self.groups:
-            body = spec.worldbody.add_body(name=group.names[0], pos=group.cg)
-            body.add_freejoint()
-            I = group.inertia
-            body.mass, body.explicitinertial = group.mass, True
-            body.fullinertia = [I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]
+        spec.option.timestep = STEP
+        spec.option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+        spec.option.solver = mujoco.mjtSolver.mjSOL_PGS
+        bodies = {}
+        for k, (parent, joint) in self.parents.items():
+            bodies[k] = self._add_body(spec, bodies.get(parent, spec.worldbody), k, parent, joint)
+        for joint in closures:
+            self._close(spec, joint)
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
-        self._joints()
-        self._bushings()
-        self._lines()
-        self._wheels()
+        self.ids = np.array([self.model.body(g.names[0]).id for g in self.groups])
 
-    def _arms(self, pairs, points):
-        """Indices (2, n) of both bodies and the points from their CGs (2, n, 3), design axes."""
-        ends = np.array([[self.index[name] for name in pair] for pair in pairs]).T
-        cgs = np.array([group.cg for group in self.groups])
-        return ends, np.asarray(points) - cgs[ends]
-
-    def _joints(self):
-        self.joints = joints = [j for j in self.car.joints if j.kind != "fixed"]
-        points = np.array([joint.point for joint in joints])
-        self.j_ends, self.j_arms = self._arms([j.bodies for j in joints], points)
-        self.j_frame = np.array([frame_about(np.array(j.axis or (0, 0, 1.0))) for j in joints])
-
-    def _bushings(self):
-        bushings = self.car.bushings
-        laws = [self.car.law_named[bushing.law] for bushing in bushings]
-        points = np.array([bushing.point for bushing in bushings])
-        self.b_ends, self.b_arms = self._arms([b.bodies for b in bushings], points)
-        self.b_k = np.array([law.stiffness for law in laws])
-        self.b_s = np.array([law.scale for law in laws])
-        self.b_c = self.b_k * np.array([[law.time_constant] for law in laws])
-
-    def _lines(self):
-        lines = (*self.car.springs, *self.car.dampers)
-        points = np.array([line.ends for line in lines]).transpose(1, 0, 2)
-        self.l_ends, self.l_arms = self._arms([line.bodies for line in lines], points)
-        self.l_design = np.linalg.norm(points[0] - points[1], axis=1)
-        self.l_strut = [self.car.strut(line.corner) for line in lines]
-
-    def _wheels(self):
-        wheels = self.car.wheels
-        self.w = np.array([self.index[wheel.body] for wheel in wheels])
-        self.w_arm = np.array([w.centre for w in wheels]) - [self.groups[k].cg for k in self.w]
-
-    # --- forces -------------------------------------------------------------------------------
-
-    def _state(self):
-        d, n = self.data, len(self.groups)
-        R = d.xmat[1:].reshape(n, 3, 3)
-        qvel = d.qvel.reshape(n, 6)
-        w = np.einsum("nij,nj->ni", R, qvel[:, 3:])
-        return d.xpos[1:], R, qvel[:, :3], w
-
-    def _ends(self, ends, arms):
-        x, R, v, w = self.now
-        turned = np.einsum("enij,enj->eni", R[ends], arms)
-        return turned, x[ends] + turned, v[ends] + np.cross(w[ends], turned)
-
-    def _pull(self, ends, turned, force):
-        """A force (n, 3) on the first ends and its opposite on the second."""
-        for end, sign in ((0, 1.0), (1, -1.0)):
-            np.add.at(self.force, ends[end], sign * force)
-            np.add.at(self.torque, ends[end], sign * np.cross(turned[end], force))
-
-    def _twist(self, ends, torque):
-        np.add.at(self.torque, ends[0], torque)
-        np.add.at(self.torque, ends[1], -torque)
-
-    def admissible(self):
-        """Motions (6 groups, n) of CGs and spins that no joint hinders where the bodies are."""
-        _, R, _, _ = self.now
-        turned, points, _ = self._ends(self.j_ends, self.j_arms)
-        turned[0] += points[1] - points[0]  # a slide is held where the second body is
-        A, B = (R[end] @ self.j_frame for end in self.j_ends)
-        rows = []
-        for k, joint in enumerate(self.joints):
-            x, y, z = A[k].T
-            held = [x, y] if joint.kind == "cylindrical" else [x, y, z]
-            for axis in held:
-                rows.append(self._row(k, axis, [np.cross(turned[end, k], axis) for end in (0, 1)]))
-            if joint.kind in ("revolute", "cylindrical"):
-                rows += [self._row(k, 0.0 * axis, [axis, axis]) for axis in (x, y)]
-            if joint.kind == "universal":
-                square = np.cross(x, B[k][:, 1])
-                rows.append(self._row(k, 0.0 * x, [square, square]))
-        return null_space(np.array(rows))
-
-    def _row(self, k, along, about):
-        row = np.zeros((len(self.groups), 6))
-        for end, sign in ((0, -1.0), (1, 1.0)):
-            row[self.j_ends[end, k]] += sign * np.hstack([along, about[end]])
-        return row.ravel()
-
-    def _bushing_forces(self):
-        _, R, _, w = self.now
-        ends, speed = self.b_ends, self.car.bushing_speed
-        turned, p, v = self._ends(ends, self.b_arms)
-        A = R[ends[0]]
-        relative = np.einsum("nji,njk->nik", A, R[ends[1]])
-        first = np.arctan2(-relative[:, 1, 2], relative[:, 2, 2])
-        second = np.arcsin(relative[:, 0, 2])
-        third = np.arctan2(-relative[:, 0, 1], relative[:, 0, 0])
-        angle = np.stack([first, second, third], 1)
-        # The displacement turns with the first body, and so does its rate.
-        rate = v[1] - v[0] - np.cross(w[ends[0]], p[1] - p[0])
-        local = lambda a: np.einsum("nji,nj->ni", A, a)  # noqa: E731
-        u = np.hstack([local(p[1] - p[0]), angle])
-        u_rate = np.hstack([local(rate), local(w[ends[1]] - w[ends[0]])])
-        f = self.b_k * u * (1 + (u / self.b_s) ** 2)
-        f += self.b_c * u_rate / np.sqrt(1 + (u_rate / speed) ** 2)
-        back = np.einsum("nij,nkj->nki", A, f.reshape(-1, 2, 3))
-        self._pull(ends, turned, back[:, 0])
-        self._twist(ends, back[:, 1])
-
-    def _line_forces(self):
-        turned, p, v = self._ends(self.l_ends, self.l_arms)
-        apart = p[1] - p[0]
-        length = np.linalg.norm(apart, axis=1)
-        along = apart / length[:, None]
-        rate = np.einsum("ni,ni->n", v[1] - v[0], along)
-        tension = np.zeros(8)
-        for k, strut in enumerate(self.l_strut):
-            longer = length[k] - self.l_design[k]
-            if k < 4:
-                tension[k] = strut.spring.stiffness * longer - strut.spring.preload
+    def _spanned(self):
+        """Parent and joint of every group, parents first, and the joints that close loops."""
+        joints = [j for j in self.car.joints if j.kind != "fixed"]
+        joints.sort(key=lambda joint: joint.kind == "ball")  # what closes a loop is to be a ball
+        tree, closures = [], []
+        together = list(range(len(self.groups)))
+        for joint in joints:
+            a, b = (together[k] for k in self._ends(joint))
+            (closures if a == b else tree).append(joint)
+            together = [a if one == b else one for one in together]
+        parents = {}
+        # No wheel is a root, so that its spin is one hinge's angle.
+        spinning = set(self.forces.wheels)
+        by_mass = sorted(range(len(self.groups)), key=lambda k: -self.groups[k].mass)
+        for root in sorted(by_mass, key=spinning.__contains__):
+            if root in parents:
                 continue
-            c = strut.damper.rebound if rate[k] > 0 else strut.damper.bump
-            tension[k] = c * rate[k] / np.sqrt(1 + (rate[k] / strut.damper.speed) ** 2)
-            for stop, sign in ((strut.rebound_stop, 1.0), (strut.bump_stop, -1.0)):
-                d = max(sign * longer - stop.gap, 0.0)
-                tension[k] += sign * (stop.stiffness * d + stop.cubic * d**3)
-        self._pull(self.l_ends, turned, tension[:, None] * along)
+            parents[root], found = (None, None), [root]
+            for parent in found:
+                for joint in tree:
+                    if parent in self._ends(joint):
+                        child = sum(self._ends(joint)) - parent
+                        if child not in parents:
+                            parents[child] = parent, joint
+                            found.append(child)
+        return parents, closures
 
-    def _bar_torques(self):
-        _, R, _, w = self.now
-        for bar in self.car.stabilizer_bars:
-            a, b = (self.index[name] for name in bar.bodies)
-            y = R[a][:, 1]
-            relative = R[a].T @ R[b]
-            angle = np.arctan2(relative[0, 2], relative[0, 0])
-            torque = (bar.stiffness * angle + bar.damping * (w[b] - w[a]) @ y) * y
-            self.torque[a] += torque
-            self.torque[b] -= torque
+    def _ends(self, joint):
+        return [self.index[name] for name in joint.bodies]
 
-    def _tyre_forces(self):
-        x, R, v, w = self.now
-        t, k = self.car.tyre, self.w
-        arm = np.einsum("nij,nj->ni", R[k], self.w_arm)
-        speed = v[k] + np.cross(w[k], arm)
-        load = t.stiffness * (t.free_radius - x[k, 2] - arm[:, 2]) - t.damping * speed[:, 2]
-        force = np.maximum(load, 0.0)[:, None] * np.array([0.0, 0.0, 1.0])
-        self.force[k] += force
-        self.torque[k] += np.cross(arm, force)
+    def _axes(self, k, joint):
+        """Kinds and axes of what carries group k; a universal's first axis is its first body's."""
+        if joint.kind == "ball":
+            return [(JOINT.mjJNT_BALL, np.array([0.0, 0.0, 1.0]))]
+        x, y, z = frame_about(np.array(joint.axis)).T
+        if joint.kind == "universal":
+            both = [(JOINT.mjJNT_HINGE, x), (JOINT.mjJNT_HINGE, y)]
+            return both if k == self._ends(joint)[1] else both[::-1]
+        return [(JOINT.mjJNT_SLIDE, z)] * (joint.kind == "cylindrical") + [(JOINT.mjJNT_HINGE, z)]
 
-    # --- equations ----------------------------------------------------------------------------
+    def _add_body(self, spec, onto, k, parent, joint):
+        group = self.groups[k]
+        place = group.cg - (0.0 if parent is None else self.groups[parent].cg)
+        body = onto.add_body(name=group.names[0], pos=place)
+        I = group.inertia
+        body.mass, body.ipos, body.explicitinertial = group.mass, np.zeros(3), True
+        body.fullinertia = [I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]
+        if joint is None:
+            body.add_freejoint()
+            return body
+        for kind, axis in self._axes(k, joint):
+            body.add_joint(type=kind, axis=axis, pos=np.array(joint.point) - group.cg)
+        return body
+
+    def _close(self, spec, joint):
+        assert joint.kind == "ball"
+        a, b = self._ends(joint)
+        closure = spec.add_equality(type=mujoco.mjtEq.mjEQ_CONNECT)
+        closure.objtype = mujoco.mjtObj.mjOBJ_BODY
+        closure.name1, closure.name2 = self.groups[a].names[0], self.groups[b].names[0]
+        closure.data[:3] = np.array(joint.point) - self.groups[a].cg
+        closure.solref = [2.0 * STEP, 1.0]
+        closure.solimp = [0.9999, 0.9999, 0.001, 0.5, 2.0]
+
+    # --- state --------------------------------------------------------------------------------
 
     def place(self, x, R):
-        """Put the CGs (n, 3) and attitudes (n, 3, 3) of the bodies there, at rest."""
-        pose = self.data.qpos.reshape(-1, 7)
-        pose[:, :3] = x
-        for quaternion, matrix in zip(pose[:, 3:], R, strict=True):
-            mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(matrix).ravel())
+        """Put the CGs (n, 3) and attitudes (n, 3, 3) there, at rest, as far as joints let them."""
+        for k, (parent, joint) in self.parents.items():
+            at = self.model.jnt_qposadr[self.model.body_jntadr[self.ids[k]]]
+            q = self._free(x[k], R[k]) if joint is None else self._joined(k, parent, joint, x, R)
+            self.data.qpos[at : at + len(q)] = q
         self.data.qvel[:] = 0.0
-        mujoco.mj_forward(self.model, self.data)
-        self.now = self._state()
+        self.move()
+
+    def _free(self, x, R):
+        return [*x, *Rotation.from_matrix(R).as_quat(scalar_first=True)]
+
+    def _joined(self, k, parent, joint, x, R):
+        relative = R[parent].T @ R[k]
+        axes = self._axes(k, joint)
+        if joint.kind == "ball":
+            return Rotation.from_matrix(relative).as_quat(scalar_first=True)
+        if joint.kind == "universal":
+            F = np.column_stack([axes[0][1], axes[1][1], np.cross(axes[0][1], axes[1][1])])
+            return Rotation.from_matrix(F.T @ relative @ F).as_euler("XYZ")[:2]
+        z = axes[-1][1]
+        angle = Rotation.from_matrix(relative).as_rotvec() @ z
+        if joint.kind == "revolute":
+            return [angle]
+        arms = [np.array(joint.point) - self.groups[one].cg for one in (parent, k)]
+        return [(R[parent].T @ (x[k] - x[parent]) + relative @ arms[1] - arms[0]) @ z, angle]
+
+    def move(self):
+        """Bring positions and velocities of the bodies up to the coordinates."""
+        model, data = self.model, self.data
+        mujoco.mj_step1(model, data)
+        x, centre = data.xipos[self.ids], data.subtree_com[model.body_rootid[self.ids]]
+        w, v = data.cvel[self.ids, :3], data.cvel[self.ids, 3:]
+        self.now = x, data.xmat[self.ids].reshape(-1, 3, 3), v + cross(w, x - centre), w
+
+    # --- small motions ------------------------------------------------------------------------
 
     def applied(self):
-        """Forces and torques (6 n,) on the CGs: weight, MuJoCo's, and all but the joints'."""
-        n = len(self.groups)
-        self.force = -self.data.qfrc_bias.reshape(n, 6)[:, :3].copy()
-        self.torque = np.zeros((n, 3))
-        self._bushing_forces()
-        self._line_forces()
-        self._bar_torques()
-        self._tyre_forces()
-        return np.hstack([self.force, self.torque]).ravel()
+        """Generalized forces of everything but the closed loop, weight and gyroscopics included."""
+        self.data.xfrc_applied[self.ids] = self.forces.at(self.now)
+        mujoco.mj_fwdActuation(self.model, self.data)
+        mujoco.mj_fwdAcceleration(self.model, self.data)
+        return self.data.qfrc_smooth.copy()
+
+    def loop_jacobian(self):
+        """J (3, nv) of what closes the loop."""
+        return self.data.efc_J.reshape(self.data.nefc, self.model.nv).copy()
+
+    def admissible(self):
+        """Motions (nv, n) that leave the loop closed."""
+        return null_space(self.loop_jacobian())
+
+    def frequencies(self):
+        """Undamped natural frequencies about where the car rests, Hz, slowest first."""
+        rest, N = self.data.qpos.copy(), self.admissible()
+        reaction = np.linalg.lstsq(self.loop_jacobian().T, -self.applied(), rcond=None)[0]
+        mass = np.zeros((self.model.nv, self.model.nv))
+        mujoco.mj_fullM(self.model, self.data, mass)
+
+        def pushed(motion):
+            self.data.qpos[:] = rest
+            mujoco.mj_integratePos(self.model, self.data.qpos, motion, INCREMENT)
+            self.move()
+            return self.applied() + self.loop_jacobian().T @ reaction
+
+        K = N.T @ np.array([pushed(-n) - pushed(n) for n in N.T]).T / (2.0 * INCREMENT)
+        self.data.qpos[:] = rest
+        self.move()
+        squares = eigh((K + K.T) / 2.0, N.T @ mass @ N, eigvals_only=True)
+        return np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi)
