@@ -1,7 +1,9 @@
 """The detailed car through a manoeuvre, as a prototype would be measured.
 
 Exudyn integrates by the generalized-alpha method. Before each step the tyres are advanced (`tyres`)
-and their forces, the drive torques and the road under the wheels are set for it.
+and their forces, the drive torques and the road under the wheels are set for it. The tyres go with
+the velocities expected at its end: with those of its beginning, forces lag, and a car that stands
+rocks itself up on its tyres.
 """
 
 from collections.abc import Callable
@@ -192,7 +194,7 @@ class _Drive:
         drive = self._demand.drive.at(end)[self._columns]
         if sampled and not self._sample(WheelSample(load, height, drive)):
             return False
-        force, torque = self._tyres.advance(motion, load, self._step)
+        force, torque = self._tyres.advance(self._motion(self._step), load, self._step)
         self._set_wheels(system, motion, height, rate, force, torque, drive)
         self._done += 1
         return True
@@ -204,10 +206,14 @@ class _Drive:
         torque = self._demand.drive.at(self._done * self._step)[self._columns]
         self._sample(WheelSample(load, height, torque))
 
-    def _motion(self) -> WheelMotion:
+    def _motion(self, ahead: float = 0.0) -> WheelMotion:
+        """The wheels' motion, with the velocities that accelerations make of it a time later."""
         data, wheels = self._model.system.systemData, self._model.wheels
         q = data.GetODE2Coordinates().reshape(-1, 6)[wheels] + self._design
-        return wheel_motion(q, data.GetODE2Coordinates_t().reshape(-1, 6)[wheels], self._offset)
+        qd = data.GetODE2Coordinates_t().reshape(-1, 6)[wheels]
+        if ahead:
+            qd = qd + ahead * data.GetODE2Coordinates_tt().reshape(-1, 6)[wheels]
+        return wheel_motion(q, qd, self._offset)
 
     def _road(self, motion: WheelMotion) -> tuple[Array, Array]:
         """Height and its rate (4,) under the wheels where the step will take them."""

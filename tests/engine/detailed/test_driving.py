@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from ridetune.engine.detailed.car_file import reference_car
-from ridetune.engine.detailed.driving import DetailedRunDiverged, drive
+from ridetune.engine.detailed.driving import LONGEST_STEP, DetailedRunDiverged, drive
 from ridetune.engine.detailed.point_mass import apparent_mass
 from ridetune.engine.errors import Cancelled, SimulationError
 from ridetune.engine.frames import CORNERS, GRAVITY
@@ -28,6 +28,13 @@ def test_at_rest_it_rests():
         assert np.abs(run[name]).max() < 1e-6
     loads = sum(run[f"tyre.{corner}.load"][-1] for corner in CORNERS)
     assert loads == pytest.approx(CAR.total_mass * GRAVITY, rel=1e-6)
+
+
+def test_what_stands_stays_standing_at_the_longest_step():
+    """Oracle: equilibrium; round-off of 1e-12 m must die out, not rock the car up on its tyres."""
+    run = drive(CAR, Manoeuvre("wait", "road", 2.0), step=LONGEST_STEP, sample_step=0.01)
+    for name in ("chassis.z", "chassis.v_x", "wheel.fl.z"):
+        assert np.abs(run[name]).max() < 1e-9
 
 
 @pytest.fixture(scope="module")
