@@ -231,11 +231,9 @@ def _describe_campaign(command: Parser) -> None:
         "--plant",
         choices=("detailed", "concept"),
         default="concept",
-        help="car to drive; the detailed one is not available yet",
+        help="car to drive; detailed: the multibody car, some minutes a drive",
     )
-    command.add_argument(
-        "--vehicle", metavar="FILE", default="paper", help="the concept car; paper unless told"
-    )
+    command.add_argument("--vehicle", metavar="FILE", help="the concept car; paper unless told")
     command.add_argument(
         "--manoeuvre",
         metavar="NAME",

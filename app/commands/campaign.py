@@ -8,10 +8,12 @@ from pathlib import Path
 
 from ...engine.campaign import CAMPAIGN, Campaign, Recording, roughened
 from ...engine.campaign_run import CampaignProgress, drive
-from ...engine.errors import CampaignError, SimulationError
+from ...engine.detailed.car_file import reference_car
+from ...engine.detailed.plant import DetailedPlant
+from ...engine.errors import CampaignError
 from ...engine.manoeuvre import Manoeuvre
 from ...engine.mdf4 import require_asammdf
-from ...engine.plant import ConceptPlant
+from ...engine.plant import ConceptPlant, Plant
 from ...engine.recording_files import files_of, files_of_car, names_of
 from ...engine.sensor_file import noisy, read_sensors
 from ...engine.sensors import SensorSet
@@ -52,16 +54,25 @@ def campaign(options: Namespace) -> None:
 
 def _plan(options: Namespace) -> Campaign:
     """The campaign that the options describe."""
-    if options.plant == "detailed":
-        raise SimulationError("The detailed car cannot be driven yet; use --plant concept.")
     changed = roughened(
         _manoeuvres(options.manoeuvre or CAMPAIGN),
         options.class_factor,
         None if options.band is None else band(options.band),
         options.road_seed,
     )
-    plant = ConceptPlant(find_vehicle(options.vehicle))
-    return Campaign.plan(plant, _sensors(options), changed, options.seed)
+    return Campaign.plan(_plant(options), _sensors(options), changed, options.seed)
+
+
+def _plant(options: Namespace) -> Plant:
+    """The car that drives."""
+    if options.plant == "concept":
+        return ConceptPlant(find_vehicle(options.vehicle or "paper"))
+    if options.vehicle is not None:
+        raise ArgumentError(
+            f"--vehicle {options.vehicle}: the detailed car brings its own data; leave out"
+            " --vehicle or --plant detailed."
+        )
+    return DetailedPlant.of(reference_car())
 
 
 def _manoeuvres(names: list[str] | tuple[str, ...]) -> dict[str, Manoeuvre]:

@@ -7,6 +7,7 @@ rocks itself up on its tyres.
 """
 
 from collections.abc import Callable
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from ..demand import Demand
 from ..errors import Cancelled, SimulationDiverged, SimulationError
 from ..frames import CORNERS, Corner
 from ..manoeuvre import Manoeuvre
+from ..output_channels import Points
 from .builder import Model
 from .equilibrium import settle
 from .ground import Ground, patch_road
@@ -38,8 +40,8 @@ SPECTRAL_RADIUS = 0.8
 TOLERANCE = 1e-4
 """Of Newton's residual; 1e-3 is seen in z and pitch."""
 
-REPORT = 20
-"""Samples between two reports of progress."""
+REPORT = 100
+"""Steps between two reports of progress."""
 
 ASTRAY = 0.5
 """m: a body this far from its place in the car means that the run has diverged."""
@@ -66,11 +68,13 @@ def drive(
     *,
     step: float = STEP,
     sample_step: float = SAMPLE_STEP,
-    progress: Callable[[float], None] | None = None,
+    points: Points = MappingProxyType({}),
+    progress: Callable[[float], object] | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> Run:
     """Time histories of a car in a manoeuvre of kind "road".
 
+    points : chassis points with accelerometers, from the measured point, m
     progress : told the share that is done, now and then
     cancelled : asked as often whether to stop; then Cancelled is raised
     Raises SimulationError for what the car cannot do, DetailedRunDiverged with the part before.
@@ -84,7 +88,7 @@ def drive(
     demand = manoeuvre.demand(point_mass(car))
     model = Model(car)
     settle(model)
-    return _Drive(model, demand, step, every, progress, cancelled).run(manoeuvre.name)
+    return _Drive(model, demand, step, every, points, progress, cancelled).run(manoeuvre.name)
 
 
 def _samples_every(step: float, sample_step: float) -> int:
@@ -109,7 +113,8 @@ class _Drive:
         demand: Demand,
         step: float,
         every: int,
-        progress: Callable[[float], None] | None,
+        points: Points,
+        progress: Callable[[float], object] | None,
         cancelled: Callable[[], bool] | None,
     ):
         car = model.car
@@ -128,7 +133,7 @@ class _Drive:
         self._done = 0
         self._failure: BaseException | None = None
         self._lost: str | None = None
-        self.histories = Histories(model, self._steps // every + 1, every * step)
+        self.histories = Histories(model, self._steps // every + 1, every * step, points)
 
     def run(self, name: str) -> Run:
         """Integrate and read the channels."""
@@ -184,7 +189,7 @@ class _Drive:
 
     def _set_forces(self, system: Any, end: float) -> bool:
         sampled = self._done % self._every == 0
-        if self._done % (REPORT * self._every) == 0:
+        if self._done % REPORT == 0:
             self._told(self._done / self._steps)
             if self._cancelled():
                 raise Cancelled("The run of the detailed car was cancelled.")
@@ -234,10 +239,10 @@ class _Drive:
                 system.SetLoadParameter(reaction, "loadVector", -drive[k] * motion.axle[k])
 
     def _sample(self, wheels: WheelSample) -> bool:
-        """Keep the present state; False where a body has left its place in the car."""
-        self.histories.keep(wheels)
+        """Keep the present state, unless a body has left its place in the car: then False."""
         body, distance = self.histories.farthest_astray()
-        if distance <= ASTRAY:
-            return True
-        self._lost = body
-        return False
+        if distance > ASTRAY:
+            self._lost = body
+            return False
+        self.histories.keep(wheels)
+        return True

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..channels import Run
+from ..output_channels import Points
 from .builder import Model
 from .pose import point, point_acceleration, point_velocity, rotation, spin
 
@@ -24,16 +25,20 @@ class WheelSample(NamedTuple):
 
 
 class Histories:
-    """States of every rigid group at the sample times.
+    """States of the rigid groups that the channels need, at the sample times.
 
     samples : how many at most;  sample_step : s
+    points : chassis points with accelerometers, from the measured point, m
     """
 
-    def __init__(self, model: Model, samples: int, sample_step: float):
+    def __init__(self, model: Model, samples: int, sample_step: float, points: Points):
         self._model = model
         self._step = sample_step
-        self._design = model.design
-        self._q, self._qd, self._qdd = (np.zeros((samples, len(model.groups), 6)) for _ in range(3))
+        self._points = points
+        ends = [model.index[body] for line in model.car.dampers for body in line.bodies]
+        self._kept = sorted({model.chassis, *model.wheels, *ends})
+        self._place = {group: k for k, group in enumerate(self._kept)}
+        self._q, self._qd, self._qdd = (np.zeros((samples, len(self._kept), 6)) for _ in range(3))
         self._wheels = np.zeros((samples, 3, 4))
         self.count = 0
 
@@ -41,15 +46,20 @@ class Histories:
         """Add the model's present state."""
         data = self._model.system.systemData
         k = self.count
-        self._q[k] = data.GetODE2Coordinates().reshape(-1, 6) + self._design
-        self._qd[k] = data.GetODE2Coordinates_t().reshape(-1, 6)
-        self._qdd[k] = data.GetODE2Coordinates_tt().reshape(-1, 6)
+        self._q[k] = self._positions()[self._kept]
+        self._qd[k] = data.GetODE2Coordinates_t().reshape(-1, 6)[self._kept]
+        self._qdd[k] = data.GetODE2Coordinates_tt().reshape(-1, 6)[self._kept]
         self._wheels[k] = wheels
         self.count += 1
 
+    def _positions(self) -> Array:
+        """Coordinates (groups, 6) of the model's present state."""
+        data = self._model.system.systemData
+        return data.GetODE2Coordinates().reshape(-1, 6) + self._model.design
+
     def farthest_astray(self) -> tuple[str, float]:
-        """The body farthest from its place in the car at the last sample, and how far, m."""
-        q, home = self._q[self.count - 1], self._design[:, :3]
+        """The body that is now farthest from its place in the car, and how far, m."""
+        q, home = self._positions(), self._model.design[:, :3]
         chassis = self._model.chassis
         away = home - home[chassis]
         expected = q[chassis, :3] + away @ rotation(q[chassis, 3:]).T
@@ -65,14 +75,14 @@ class Histories:
         channels = self._chassis(q, qd, qdd)
         model = self._model
         for k, wheel in enumerate(model.car.wheels):
-            corner, group = wheel.corner, model.wheels[k]
+            corner, group = wheel.corner, self._place[model.wheels[k]]
             centre = point(q[:, group], model.in_body(wheel.body, wheel.centre))
             channels[f"wheel.{corner}.z"] = centre[:, 2] - centre[0, 2]
             for row, kind in enumerate(("tyre.{}.load", "road.{}.z", "drive.{}.torque")):
                 channels[kind.format(corner)] = self._wheels[kept, row, k]
         for line in model.car.dampers:
             ends = [
-                point(q[:, model.index[body]], model.in_body(body, end))
+                point(q[:, self._place[model.index[body]]], model.in_body(body, end))
                 for body, end in zip(line.bodies, line.ends, strict=True)
             ]
             length = np.linalg.norm(ends[0] - ends[1], axis=1)
@@ -81,7 +91,7 @@ class Histories:
 
     def _chassis(self, q: Array, qd: Array, qdd: Array) -> dict[str, Array]:
         """Motion of the measured point and attitude of the chassis."""
-        model, k = self._model, self._model.chassis
+        model, k = self._model, self._place[self._model.chassis]
         offset = model.in_body(model.car.chassis, model.car.measured_point)
         q, qd, qdd = q[:, k], qd[:, k], qdd[:, k]
         place, velocity = point(q, offset), point_velocity(q, qd, offset)
@@ -89,7 +99,7 @@ class Histories:
         pitch = -np.arcsin(turn[:, 2, 0])
         roll = np.arctan2(turn[:, 2, 1], turn[:, 2, 2])
         # From R = Rz(yaw) Ry(pitch) Rx(roll), yaw small: w = yaw' z + pitch' y + roll' x.
-        return {
+        channels = {
             "chassis.x": place[:, 0] - place[0, 0],
             "chassis.z": place[:, 2] - place[0, 2],
             "chassis.pitch": pitch - pitch[0],
@@ -100,3 +110,7 @@ class Histories:
             "chassis.roll_rate": rates[:, 0],
             "chassis.a_x": point_acceleration(q, qd, qdd, offset)[:, 0],
         }
+        for name, away in self._points.items():
+            acceleration = point_acceleration(q, qd, qdd, offset + np.array(away))
+            channels |= {f"{name}.a_{axis}": acceleration[:, k] for k, axis in enumerate("xyz")}
+        return channels

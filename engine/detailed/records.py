@@ -216,7 +216,7 @@ class DetailedCar:
     """The whole car.
 
     chassis : the body whose motion is the car's
-    measured_point : where on it z, a_x, v_x and x are taken
+    measured_point : where on it z, a_x, v_x and x are taken, the CG of the sprung mass (`concept`)
     bushing_speed : v0 of every bushing, m/s and rad/s
     """
 

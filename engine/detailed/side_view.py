@@ -57,17 +57,23 @@ def instant_centres(
 
     model : a new one; it is left with a chassis that is held
     """
+    rest = clamped(model)
+    return [_instant_centre(model, axle, height, rest) for height in heights]
+
+
+def clamped(model: Model) -> Array:
+    """Hold the chassis of a new model where it rests; displacements (groups, 6) there."""
     rest = settle(model)
     for k in range(6):
         model.hold_coordinate(model.chassis, k, CLAMP, float(rest[model.chassis, k]))
     model.system.Assemble()
     model.hold(True)
-    return [_instant_centre(model, axle, height, rest) for height in heights]
+    return rest
 
 
 def _instant_centre(model: Model, axle: AxleName, height: float, rest: Array) -> InstantCentre:
     """One instant centre, by central differences, of the left wheel."""
-    lower, upper = (_raised(model, axle, height + s * INCREMENT / 2.0) for s in (-1.0, 1.0))
+    lower, upper = around(model, axle, height)
     wheel = next(one for one in model.car.wheels if axle_of(one.corner) == axle)
     carrier = model.index[wheel.carrier]
     offset = model.in_body(wheel.carrier, wheel.centre)
@@ -92,6 +98,14 @@ def _instant_centre(model: Model, axle: AxleName, height: float, rest: Array) ->
         travel=float(place[2] - centre(rest)[2]),
         distance=distance,
         angle=atan2(above_ground, abs(distance)) * (1.0 if distance > 0.0 else -1.0),
+    )
+
+
+def around(model: Model, axle: AxleName, height: float) -> tuple[Array, Array]:
+    """Displacements (groups, 6) of a clamped model with an axle's road just below and above."""
+    return (
+        _raised(model, axle, height - INCREMENT / 2.0),
+        _raised(model, axle, height + INCREMENT / 2.0),
     )
 
 

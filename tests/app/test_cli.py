@@ -103,7 +103,7 @@ def test_describing_the_commands_imports_no_engine():
         ("identify run.csv --vehicle paper", "run.csv"),
         ("identify run.csv --vehicle paper --noise n.toml", "n.toml"),
         ("identify run.csv --vehicle paper --colour", "--colour"),
-        ("campaign --plant detailed -o runs", "--plant concept"),
+        ("campaign --plant detailed --vehicle v.json -o runs", "leave out --vehicle"),
         ("campaign --noise n.toml -o runs", "n.toml"),
         ("bench --only raod-one", "--only raod-one: there is no row of that name; did you mean"),
         ("bench --only everything", "there are road-one, "),
@@ -429,6 +429,13 @@ def test_mdf4_without_its_package_says_what_to_install(folder, capsys, monkeypat
     monkeypatch.setattr("ridetune.engine.mdf4.find_spec", lambda name: None)
     message = refused(capsys, "campaign", "--format", "mf4", "-o", "runs")
     assert message.endswith("install ridetune[mdf], or take CSV.")
+    assert not list(folder.iterdir())
+
+
+def test_the_detailed_car_without_its_package_says_what_to_install(folder, capsys, monkeypatch):
+    monkeypatch.setattr("ridetune.engine.detailed.exudyn_module.find_spec", lambda name: None)
+    message = refused(capsys, "campaign", "--plant", "detailed", "-o", "runs")
+    assert message.endswith('install it: pip install "ridetune[detailed]"')
     assert not list(folder.iterdir())
 
 
