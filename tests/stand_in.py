@@ -38,7 +38,7 @@ def values_of(cars):
         distance = -inwards * at["arm_x"]
         found |= {
             f"{axle}.suspension.stiffness": at["stiffness"],
-            f"{axle}.suspension.damping": at["damping"],
+            f"{axle}.suspension.damping": 0.5 * (at["jounce_damping"] + at["rebound_damping"]),
             f"{axle}.stabilizer_bar.stiffness": bar[f"{axle}_bar_stiffness"],
             f"{axle}.stabilizer_bar.damping": bar[f"{axle}_bar_damping"],
             f"{axle}.pivot.distance": distance,
