@@ -1,26 +1,21 @@
 """The same car stepped by Exudyn: a kinematic tree with its own connectors and loads.
 
 Spring-dampers, bars and tyres are Exudyn's connectors. What they take over time (`histories`) is
-loads, which a Python function sets before each step, about a tenth of the time. Exudyn's fast build
-is asked for, which checks no ranges, and its own inverse of the mass matrix, body by body.
+loads, which a Python function sets before each step, about a tenth of the time. Exudyn's own
+inverse of the mass matrix is asked for, body by body.
 """
 
-import sys
-from contextlib import redirect_stdout
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...engine.detailed.exudyn_module import require_exudyn
 from ...engine.vehicle import Inertia, Vehicle
 from .car_points import GRAVITY, Corner, corners_of
 from .histories import Histories
 
-sys.exudynFast = True  # pyright: ignore[reportAttributeAccessIssue]  # read by the import
-with redirect_stdout(sys.stderr):
-    exudyn: Any = import_module("exudyn")
-    items: Any = import_module("exudyn.itemInterface")
+exudyn, items = require_exudyn()
 
 Array = NDArray[np.float64]
 
