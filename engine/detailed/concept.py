@@ -92,7 +92,7 @@ def cut(car: DetailedCar) -> Parts:
     whole = _weighted(model.groups, np.ones(len(model.groups)))
     rest = whole.mass * whole.cg
     for axle in AXLES:
-        rest = rest - 2.0 * corners[axle].mass * _middle(car, axle)
+        rest = rest - 2.0 * corners[axle].mass * car.middle(axle)
     return Parts(replace(sprung, cg=rest / sprung.mass), corners)
 
 
@@ -127,14 +127,9 @@ def _weighted(groups: list[Group], weight: Array) -> Group:
     return Group((), float(mass), cg, inertia)
 
 
-def _middle(car: DetailedCar, axle: AxleName) -> Array:
-    """Mean of an axle's wheel centres (3,)."""
-    return np.mean([w.centre for w in car.wheels if axle_of(w.corner) == axle], axis=0)
-
-
 def _axle(car: DetailedCar, name: AxleName, parts: Parts) -> Axle:
-    wheels = [wheel for wheel in car.wheels if axle_of(wheel.corner) == name]
-    x, _, z = _middle(car, name)
+    wheels = car.wheels_of(name)
+    x, _, z = car.middle(name)
     corner = parts.corners[name]
     tyre = car.tyre
     return Axle(

@@ -7,7 +7,7 @@ so that T = r M' (a + fr g M/M') / n and the coasting -fr g M/M' are this car's.
 
 import numpy as np
 
-from ..frames import AxleName, axle_of
+from ..frames import AxleName
 from ..vehicle import (
     Axle,
     Chassis,
@@ -54,12 +54,11 @@ def point_mass(car: DetailedCar) -> Vehicle:
 
 
 def _axle(car: DetailedCar, name: AxleName, mass: float) -> Axle:
-    wheels = [wheel for wheel in car.wheels if axle_of(wheel.corner) == name]
-    centres = np.array([wheel.centre for wheel in wheels])
+    wheels = car.wheels_of(name)
     tyre = car.tyre
     return Axle(
-        cg_distance=float(abs(centres[:, 0].mean() - car.measured_point[0])),
-        track=float(np.ptp(centres[:, 1])),
+        cg_distance=float(abs(car.middle(name)[0] - car.measured_point[0])),
+        track=float(np.ptp([wheel.centre[1] for wheel in wheels])),
         wheel=Wheel(LIGHT, tyre.rolling_radius, Inertia3(0.01, 0.01, 0.01)),
         tyre=Tyre(tyre.stiffness, tyre.damping, tyre.rolling_resistance * car.total_mass / mass),
         driven=any(wheel.driven_against for wheel in wheels),

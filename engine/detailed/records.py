@@ -237,6 +237,14 @@ class DetailedCar:
     stabilizer_bars: tuple[StabilizerBar, ...]
     description: str = ""
 
+    def wheels_of(self, axle: AxleName) -> tuple[Wheel, ...]:
+        """The wheels of an axle."""
+        return tuple(wheel for wheel in self.wheels if axle_of(wheel.corner) == axle)
+
+    def middle(self, axle: AxleName) -> NDArray[np.float64]:
+        """Mean of an axle's wheel centres (3,)."""
+        return np.mean([wheel.centre for wheel in self.wheels_of(axle)], axis=0)
+
     @cached_property
     def body_named(self) -> dict[str, BodyData]:
         """Bodies by name."""
