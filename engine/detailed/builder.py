@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..frames import GRAVITY
 from .exudyn_module import require_exudyn
-from .laws import bushing_law, damper_law, tyre_law
+from .laws import brake_law, bushing_law, damper_law, tyre_law
 from .records import CONSTRAINED, DetailedCar
 from .rigid import Group, frame_about, joint_frame, rigid_groups
 
@@ -35,7 +35,8 @@ class Model:
     groups : rigid groups;  index : group by body name
     exudyn : the module;  system : its MainSystem
     wheels (4,) : group of each wheel in the order of the car's wheels
-    tyres, tractions, torques : per wheel, numbers of the tyre connector and of the loads
+    tyres, brakes : per wheel, numbers of the connectors
+    tractions, torques : per wheel, numbers of the loads
     reactions : per wheel, number of the load on the body that takes its torque, or None
     design (groups, 6) : coordinates in the design position
     """
@@ -63,6 +64,7 @@ class Model:
         self._add_lines()
         self._add_bars()
         self._add_wheels()
+        self.brakes = self._add_brakes()
         self._holds = self._add_holds()
         self.system.Assemble()
 
@@ -213,6 +215,27 @@ class Model:
             return None
         marker = self.marker(body, self.groups[self.index[body]].cg)
         return self.system.AddLoad(self.items.LoadTorqueVector(markerNumber=marker))
+
+    def _add_brakes(self) -> list[int]:
+        """Numbers of the connectors between carriers and wheels."""
+        law = self._record(
+            brake_law(self.car.tyre.rolling_radius, self.exudyn.symbolic),
+            "ObjectConnectorTorsionalSpringDamper",
+            "springTorqueUserFunction",
+        )
+        frame = frame_about(AXLE)
+        return [
+            self.system.AddObject(
+                self.items.ObjectConnectorTorsionalSpringDamper(
+                    markerNumbers=[
+                        self.marker(body, wheel.centre, frame)
+                        for body in (wheel.carrier, wheel.body)
+                    ],
+                    springTorqueUserFunction=law,
+                )
+            )
+            for wheel in self.car.wheels
+        ]
 
     def hold_coordinate(self, group: int, coordinate: int, stiffness: float, at: float) -> int:
         """Number of a new spring that holds a coordinate at a displacement from the design."""

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..frames import AXLES, AxleName, axle_of
 from ..vehicle import (
     Axle,
+    Brakes,
     Chassis,
     Inertia,
     Inertia3,
@@ -74,6 +75,7 @@ def known_vehicle(car: DetailedCar) -> Vehicle:
         chassis=Chassis(parts.sprung.mass, Inertia(xx, yy, zz, xz), car.measured_point[2]),
         front=_axle(car, "front", parts),
         rear=_axle(car, "rear", parts),
+        brakes=Brakes(car.brakes.front_share),
         source=SOURCE,
     )
     check(vehicle, car.name)

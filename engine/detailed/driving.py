@@ -1,9 +1,9 @@
 """The detailed car through a manoeuvre, as a prototype would be measured.
 
 Exudyn integrates by the generalized-alpha method. Before each step the tyres are advanced (`tyres`)
-and their forces, the drive torques and the road under the wheels are set for it. The tyres go with
-the velocities expected at its end: with those of its beginning, forces lag, and a car that stands
-rocks itself up on its tyres.
+and their forces, the torques of drive and brakes and the road under the wheels are set for it. The
+tyres go with the velocities expected at its end: with those of its beginning, forces lag, and a car
+that stands rocks itself up on its tyres.
 """
 
 from collections.abc import Callable
@@ -80,10 +80,10 @@ def drive(
     Raises SimulationError for what the car cannot do, DetailedRunDiverged with the part before.
     """
     every = _samples_every(step, sample_step)
-    if manoeuvre.kind != "road" or manoeuvre.brake is not None:
+    if manoeuvre.kind != "road":
         raise SimulationError(
-            f"Manoeuvre {manoeuvre.name!r} brakes or stands on a rig, which the detailed car"
-            ' cannot; choose one of kind "road" without "brake".'
+            f"Manoeuvre {manoeuvre.name!r} is one of a rig, on which the detailed car cannot"
+            ' stand; choose one of kind "road".'
         )
     demand = manoeuvre.demand(point_mass(car))
     model = Model(car)
@@ -196,11 +196,13 @@ class _Drive:
         motion = self._motion()
         height, rate = self._road(motion)
         load = self._tyres.load(motion, height, rate)
-        drive = self._demand.drive.at(end)[self._columns]
-        if sampled and not self._sample(WheelSample(load, height, drive)):
+        drive, brake = self._torques(end)
+        if sampled and not self._sample(WheelSample(load, height, drive, brake)):
             return False
         force, torque = self._tyres.advance(self._motion(self._step), load, self._step)
         self._set_wheels(system, motion, height, rate, force, torque, drive)
+        for number, most in zip(self._model.brakes, brake, strict=True):
+            system.SetObjectParameter(number, "damping", most)
         self._done += 1
         return True
 
@@ -208,8 +210,12 @@ class _Drive:
         motion = self._motion()
         height, rate = self._road(motion)
         load = self._tyres.load(motion, height, rate)
-        torque = self._demand.drive.at(self._done * self._step)[self._columns]
-        self._sample(WheelSample(load, height, torque))
+        self._sample(WheelSample(load, height, *self._torques(self._done * self._step)))
+
+    def _torques(self, time: float) -> tuple[Array, Array]:
+        """Drive and brake torques (4,) that are asked for at a time, N m."""
+        drive, brake = self._demand.drive.at(time), self._demand.brake.at(time)
+        return drive[self._columns], brake[self._columns]
 
     def _motion(self, ahead: float = 0.0) -> WheelMotion:
         """The wheels' motion, with the velocities that accelerations make of it a time later."""

@@ -16,12 +16,18 @@ Array = NDArray[np.float64]
 class WheelSample(NamedTuple):
     """What acts at the four wheels in the order of the car's wheels, each (4,).
 
-    load : tyre load, N;  road : height under the wheel, m;  torque : drive torque, N m
+    load : tyre load, N;  road : height under the wheel, m
+    drive, brake : torques, N m, the brake's as a positive number
     """
 
     load: Array
     road: Array
-    torque: Array
+    drive: Array
+    brake: Array
+
+
+AT_WHEELS = ("tyre.{}.load", "road.{}.z", "drive.{}.torque", "brake.{}.torque")
+"""Channels of a `WheelSample`, in its order."""
 
 
 class Histories:
@@ -39,7 +45,7 @@ class Histories:
         self._kept = sorted({model.chassis, *model.wheels, *ends})
         self._place = {group: k for k, group in enumerate(self._kept)}
         self._q, self._qd, self._qdd = (np.zeros((samples, len(self._kept), 6)) for _ in range(3))
-        self._wheels = np.zeros((samples, 3, 4))
+        self._wheels = np.zeros((samples, len(WheelSample._fields), 4))
         self.count = 0
 
     def keep(self, wheels: WheelSample) -> None:
@@ -78,7 +84,7 @@ class Histories:
             corner, group = wheel.corner, self._place[model.wheels[k]]
             centre = point(q[:, group], model.in_body(wheel.body, wheel.centre))
             channels[f"wheel.{corner}.z"] = centre[:, 2] - centre[0, 2]
-            for row, kind in enumerate(("tyre.{}.load", "road.{}.z", "drive.{}.torque")):
+            for row, kind in enumerate(AT_WHEELS):
                 channels[kind.format(corner)] = self._wheels[kept, row, k]
         for line in model.car.dampers:
             ends = [

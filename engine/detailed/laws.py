@@ -7,6 +7,7 @@ An expression takes the exact arguments that Exudyn names for a connector. `math
 from collections.abc import Callable
 from typing import Any
 
+from ..frames import CREEP_SPEED
 from .records import BushingLaw, Damper, Stop, Strut, TyreData
 
 Law = Callable[..., Any]
@@ -73,6 +74,27 @@ def _stop(stop: Stop, travel: Any, math: Any) -> Any:
     """Force of a stop against travel towards it."""
     d = math.max(travel - stop.gap, 0.0 * travel)
     return stop.stiffness * d + stop.cubic * d * d * d
+
+
+def brake_law(radius: float, math: Any) -> Law:
+    """Torque, N m, on the wheel against its turning in the carrier: B tanh(r spin / v0).
+
+    damping : B, which a driver sets
+    """
+
+    def torque(
+        mbs: Any,
+        t: Any,
+        itemNumber: Any,
+        rotation: Any,
+        angularVelocity: Any,
+        stiffness: Any,
+        damping: Any,
+        offset: Any,
+    ) -> Any:
+        return damping * math.tanh(radius * angularVelocity / CREEP_SPEED)
+
+    return torque
 
 
 def tyre_law(tyre: TyreData, math: Any) -> Law:

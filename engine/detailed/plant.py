@@ -13,9 +13,10 @@ from ..plant import Asked, Driven, Told
 from ..vehicle import Vehicle
 from .concept import known_vehicle
 from .driving import STEP, DetailedRunDiverged, drive
+from .histories import AT_WHEELS
 from .records import DetailedCar
 
-AT_CORNERS = ("wheel.{}.z", "suspension.{}.travel", "tyre.{}.load", "road.{}.z", "drive.{}.torque")
+AT_CORNERS = ("wheel.{}.z", "suspension.{}.travel", *AT_WHEELS)
 
 
 @dataclass(frozen=True)

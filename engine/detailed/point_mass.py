@@ -2,7 +2,8 @@
 
 A torque law asks for the mass that is to be accelerated, and the spin of the wheels adds to it. The
 `Vehicle` made here has that apparent mass M' = M + sum I/r^2, and the rolling resistance fr M/M',
-so that T = r M' (a + fr g M/M') / n and the coasting -fr g M/M' are this car's.
+so that T = r M' (a + fr g M/M') / n, the coasting -fr g M/M' and the brakes' force M' b are this
+car's.
 """
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from ..frames import AxleName
 from ..vehicle import (
     Axle,
+    Brakes,
     Chassis,
     Inertia,
     Inertia3,
@@ -50,6 +52,7 @@ def point_mass(car: DetailedCar) -> Vehicle:
         chassis=Chassis(sprung, Inertia(sprung, sprung, sprung), cg_height=0.5),
         front=_axle(car, "front", mass),
         rear=_axle(car, "rear", mass),
+        brakes=Brakes(car.brakes.front_share),
     )
 
 

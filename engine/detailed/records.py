@@ -185,6 +185,13 @@ class Wheel:
 
 
 @dataclass(frozen=True, slots=True)
+class Brakes:
+    """Front axle's share of the braking force; a brake holds its wheel against the carrier."""
+
+    front_share: Annotated[float, Range("1", 0.0, 1.0)]
+
+
+@dataclass(frozen=True, slots=True)
 class SlipLaw:
     """Force = slip_stiffness * slip for small steady slip, after a way of relaxation_length."""
 
@@ -227,6 +234,7 @@ class DetailedCar:
     front: Strut
     rear: Strut
     wheels: tuple[Wheel, ...]
+    brakes: Brakes
     bushing_speed: Annotated[float, Range("m/s or rad/s", 1e-3, 100.0)]
     bushing_laws: tuple[BushingLaw, ...]
     bodies: tuple[BodyData, ...]

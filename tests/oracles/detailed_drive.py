@@ -29,6 +29,7 @@ class DetailedDrive:
         against = [wheel.driven_against for wheel in self.car.wheels]
         self.driven = [k for k, name in enumerate(against) if name]
         self.reacting = [oracle.index[against[k]] for k in self.driven]
+        self.carriers = [oracle.index[wheel.carrier] for wheel in self.car.wheels]
         self.chassis = oracle.index[self.car.chassis]
         cg = oracle.groups[self.chassis].cg
         self.point = np.array(self.car.measured_point) - cg
@@ -92,7 +93,13 @@ class DetailedDrive:
         rolling = t.rolling_resistance * load * t.rolling_radius * np.tanh(along / CREEP_SPEED)
         return force, cross(-t.rolling_radius * up, force) - rolling[:, None] * axle
 
-    def _step(self, demanded):
+    def _brake(self, most, axle, spin):
+        """Torques (4, 3) on the wheels, the carriers' spin counted off."""
+        w = self.oracle.now[3][self.carriers]
+        slow = self.car.tyre.rolling_radius * (spin - np.sum(w * axle, axis=1)) / CREEP_SPEED
+        return -(most * np.tanh(slow))[:, None] * axle
+
+    def _step(self, demanded, most):
         oracle, forces = self.oracle, self.oracle.forces
         oracle.move()
         forces.now = oracle.now
@@ -102,7 +109,9 @@ class DetailedDrive:
         forces.at(oracle.now, height, slope * velocity[:, 0])
         force, torque = self._tractions(velocity, axle, spin)
         drive = demanded[:, None] * axle
-        forces.push_wheels(arm, force, torque + drive)
+        brake = self._brake(most, axle, spin)
+        forces.push_wheels(arm, force, torque + drive + brake)
+        np.subtract.at(forces.torque, self.carriers, brake)
         for k, body in zip(self.driven, self.reacting, strict=True):
             forces.torque[body] -= drive[k]
         oracle.data.xfrc_applied[oracle.ids, :3] = forces.force
@@ -127,8 +136,10 @@ class DetailedDrive:
         every = round(sample_step / STEP)
         times = STEP * np.arange(round(self.demand.duration / STEP) + 1)
         rows = []
-        for k, demanded in enumerate(self.demand.drive.at(times)[:, self.corners]):
-            self._step(demanded)
+        drive = self.demand.drive.at(times)[:, self.corners]
+        brake = self.demand.brake.at(times)[:, self.corners]
+        for k, torques in enumerate(zip(drive, brake, strict=True)):
+            self._step(*torques)
             if k % every == 0:
                 rows.append(self._sample())
         rows = np.array(rows)

@@ -9,7 +9,7 @@ from ridetune.engine.detailed.driving import drive
 from ridetune.engine.detailed.equilibrium import settle
 from ridetune.engine.manoeuvre import Manoeuvre
 from ridetune.engine.road_specs import IsoRoad, Section
-from ridetune.engine.torque_laws import DriveTable
+from ridetune.engine.torque_laws import BrakeTable, DriveTable
 
 from .detailed_drive import DetailedDrive
 from .mujoco_detailed import resting
@@ -26,8 +26,18 @@ MOTION = ("chassis.z", "chassis.pitch", "chassis.roll", "wheel.fl.z", "wheel.rr.
             Manoeuvre("push", "road", 0.3, drive=DriveTable((0.0, 0.1), (0.0, 600.0))),
             (*MOTION, "chassis.x", "chassis.v_x"),
         ),
+        (
+            Manoeuvre(
+                "stop",
+                "road",
+                0.4,
+                initial_speed=1.0,
+                brake=BrakeTable((0.0, 0.05), (0.0, 1500.0)),
+            ),
+            (*MOTION, "chassis.x", "chassis.v_x"),
+        ),
     ],
-    ids=["rough road", "torque from rest"],
+    ids=["rough road", "torque from rest", "braking to rest"],
 )
 def test_it_moves_as_mujocos_car_does(manoeuvre, names):
     """Oracle: MuJoCo's steps of 0.2 ms; the rms apart is below 1 % of the standard deviation.
