@@ -7,6 +7,7 @@ from importlib.util import find_spec
 
 from .channels import Run, channel
 from .errors import MeasurementError
+from .units import to_si
 
 
 def require_asammdf() -> None:
@@ -17,21 +18,27 @@ def require_asammdf() -> None:
         )
 
 
-def run_to_mdf4(run: Run, facts: Mapping[str, str], date: datetime) -> bytes:
-    """One group of channels in SI, each with its unit, and its meaning and sign as its comment.
+def run_to_mdf4(
+    run: Run, units: Mapping[str, str], facts: Mapping[str, str], date: datetime
+) -> bytes:
+    """One group of channels, each with its unit, and its meaning and sign as its comment.
 
+    units : by channel, of those that are not to be in SI
     facts : description, vehicle and others, kept in the header;  date : with a time zone
     """
     require_asammdf()
     from asammdf import MDF, Signal
 
+    signals = []
+    for name in run.columns:
+        si = channel(name).unit
+        unit = units.get(name, si)
+        values = run[name] / to_si(unit, si)[0]
+        signals.append(Signal(values, run.time, name=name, unit=unit, comment=_said(name)))
     with MDF(version="4.10") as file:
         file.start_time = date
         file.append(
-            [
-                Signal(run[name], run.time, name=name, unit=channel(name).unit, comment=_said(name))
-                for name in run.columns
-            ],
+            signals,
             acq_name=run.name,
             common_timebase=True,
         )

@@ -11,6 +11,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from difflib import SequenceMatcher
 from pathlib import Path
+from types import MappingProxyType
 from typing import BinaryIO
 
 import numpy as np
@@ -76,10 +77,19 @@ def write_run(run: Run, path: str | Path) -> None:
     Path(path).write_text(run_to_csv(run), encoding="utf-8", newline="\n")
 
 
-def run_to_csv(run: Run) -> str:
-    """A run as CSV text in SI, one row a sample, columns in the table's order."""
-    titles = [f"{name} [{channel(name).unit}]" for name in ("time", *run.columns)]
-    table = np.column_stack([run.time, *(run[name] for name in run.columns)])
+def run_to_csv(run: Run, units: Mapping[str, str] = MappingProxyType({})) -> str:
+    """A run as CSV text, one row a sample, columns in the table's order.
+
+    units : by channel, of those that are not to be in SI
+    """
+    columns = {"time": run.time, **{name: run[name] for name in run.columns}}
+    titles, values = [], []
+    for name, si in columns.items():
+        unit = units.get(name, channel(name).unit)
+        factor, _ = to_si(unit, channel(name).unit)
+        titles.append(f"{name} [{unit}]")
+        values.append(si / factor)
+    table = np.column_stack(values)
     # A time counted from 1970 in seconds takes ten digits before the point.
     row = ",".join(["%.15g"] + ["%.12g"] * len(run.columns))
     return "\n".join([",".join(titles), *(row % tuple(values) for values in table.tolist()), ""])

@@ -38,10 +38,11 @@ def files_of(
     files = {f"{recording.name}.manoeuvre.json": _json(manoeuvre_to_json(recording.manoeuvre))}
     if recording.run is not None:
         stem = f"{recording.name}{'.partial' if recording.failure else ''}"
+        units = campaign.sensors.units()
         files[f"{stem}.{form}"] = (
-            run_to_csv(recording.run).encode()
+            run_to_csv(recording.run, units).encode()
             if form == "csv"
-            else run_to_mdf4(recording.run, _facts(recording, campaign), date)
+            else run_to_mdf4(recording.run, units, _facts(recording, campaign), date)
         )
         files[f"{stem}.toml"] = notes(recording, campaign, date).encode()
     return files

@@ -6,7 +6,9 @@
     "point.boot" = [-1.5, 0.0, 0.2]
 
     [sensors."wheel.{corner}.z"]           # all four
-    noise = 0.0005
+    unit = "mm"                            # of noise, bias and resolution, and in the files
+    noise = 0.5
+    resolution = 0.01
     rate_hz = 100
     cutoff_hz = 40                         # anti-alias filter
 
@@ -29,6 +31,7 @@ from .frames import AXLES, CORNERS
 from .json_record import RecordReader, describe
 from .run_notes import LARGEST_FILE
 from .sensors import RATE, RECORDED, Sensor, SensorSet
+from .units import UnitError
 from .vehicle import Range
 
 KEYS = ("rate_hz", "points", "sensors")
@@ -92,6 +95,10 @@ def sensors_from_json(data: Any, source: str = "sensors") -> SensorSet:
     for name, value in _leaves(reader, data["sensors"], "sensors").items():
         sensor = reader.record(Sensor, value, f"sensors.{name}")
         for one in _channels(reader, name):
+            try:
+                sensor.si_factor(one)
+            except UnitError as error:
+                raise reader.refuse(f"sensors.{name}.unit", f"cannot be: {error}") from error
             sensors[one] = sensor
     if not 0 < len(sensors) <= MOST_CHANNELS:
         raise reader.refuse("sensors", f"lists {len(sensors)} channels; give 1 to {MOST_CHANNELS}.")

@@ -4,8 +4,9 @@
 
 x_f is the true channel behind the sensor's anti-alias filter, a causal Butterworth low-pass of
 order ANTIALIAS_ORDER, or the channel itself without one; before the start it has the first value.
-noise_k is white and Gaussian. A sensor slower than the recording holds each value until its next
-one, as a logger on a bus does.
+noise_k is white and Gaussian. What is read is the nearest multiple of the sensor's resolution,
+where it has one. A sensor slower than the recording holds each value until its next one, as a
+logger on a bus does.
 
 Every channel of every run draws from a stream of its own, so that a channel's noise does not depend
 on which others are noisy, nor on which runs are driven.
@@ -21,8 +22,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
-from .channels import CHANNELS, Run
+from .channels import CHANNELS, Run, channel
 from .frames import CORNERS
+from .units import to_si
 from .vehicle import Range
 
 Array = NDArray[np.float64]
@@ -52,17 +54,24 @@ _SAME_INSTANT = 1e-9
 class Sensor:
     """How one channel is measured; ideal unless told.
 
-    noise : standard deviation, and bias : in the channel's SI unit
+    unit : of its numbers here and in the files, None for the channel's SI unit
+    noise : standard deviation;  bias;  resolution : smallest step of a reading, 0 for none
     rate_hz : samples a second, None for as many as the recording
     cutoff_hz : of the anti-alias filter, None for none
     """
 
+    unit: str | None = None
     noise: Annotated[float, Range("1", 0.0, 1e6)] = 0.0
     bias: Annotated[float, Range("1", -1e6, 1e6)] = 0.0
+    resolution: Annotated[float, Range("1", 0.0, 1e6)] = 0.0
     gain: Annotated[float, Range("1", -1e3, 1e3, apart=1e-3)] = 1.0
     delay: Annotated[float, Range("s", 0.0, 10.0)] = 0.0
     rate_hz: Annotated[float, Range("Hz", 0.1, 1e5)] | None = None
     cutoff_hz: Annotated[float, Range("Hz", 0.1, 5e4)] | None = None
+
+    def si_factor(self, name: str) -> float:
+        """SI units in one of its own, as the sensor of a channel; UnitError for what is none."""
+        return 1.0 if self.unit is None else to_si(self.unit, channel(name).unit)[0]
 
 
 def _ideal() -> dict[str, Sensor]:
@@ -85,8 +94,14 @@ class SensorSet:
     source: str = "sensors"
 
     def noise(self) -> dict[str, float]:
-        """Standard deviation by channel, of those that are noisy."""
-        return {name: one.noise for name, one in self.sensors.items() if one.noise}
+        """Standard deviation by channel in SI, of those that are noisy."""
+        return {
+            name: one.noise * one.si_factor(name) for name, one in self.sensors.items() if one.noise
+        }
+
+    def units(self) -> dict[str, str]:
+        """Unit by channel, of those with one of their own."""
+        return {name: one.unit for name, one in self.sensors.items() if one.unit is not None}
 
 
 def measured(true: Run, sensors: SensorSet, seed: int, stream: int) -> Run:
@@ -119,8 +134,12 @@ def _readings(
     filtered = _antialiased(true.time, true[name], sensor.cutoff_hz)
     begin = true.time[0]
     seen = np.clip(begin + instants - sensor.delay, begin, true.time[-1])
-    values = sensor.gain * CubicSpline(true.time, filtered)(seen) + sensor.bias
-    return (values + sensor.noise * random.standard_normal(instants.size))[tick]
+    values = sensor.gain * CubicSpline(true.time, filtered)(seen)
+    factor = sensor.si_factor(name)
+    values += factor * (sensor.bias + sensor.noise * random.standard_normal(instants.size))
+    if step := factor * sensor.resolution:
+        values = step * np.round(values / step)
+    return values[tick]
 
 
 def _antialiased(time: Array, values: Array, cutoff: float | None) -> Array:

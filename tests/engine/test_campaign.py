@@ -7,6 +7,7 @@ from collections import Counter
 from dataclasses import replace
 from datetime import UTC, datetime
 
+import numpy as np
 import pytest
 from asammdf import MDF
 from numpy.testing import assert_allclose, assert_array_equal
@@ -38,7 +39,7 @@ WALL = manoeuvre_from_json(
 SENSORS = SensorSet(
     sensors={
         "chassis.z": Sensor(noise=5e-4, bias=0.01, gain=1.02, delay=0.02),
-        "wheel.fl.z": Sensor(rate_hz=100.0, cutoff_hz=40.0),
+        "wheel.fl.z": Sensor(unit="mm", rate_hz=100.0, cutoff_hz=40.0),
         "point.boot.a_z": Sensor(),
     },
     points={"point.boot": (-1.5, 0.0, 0.2)},
@@ -175,7 +176,7 @@ def test_notes_state_noise_rates_and_filters_and_the_truth_lies_apart():
     assert (truth["seed"], truth["plant"]) == (5, "concept")
     assert truth["sensors"]["chassis.z"] == {
         **{"noise": 5e-4, "bias": 0.01, "gain": 1.02, "delay": 0.02},
-        **{"rate_hz": None, "cutoff_hz": None},
+        **{"rate_hz": None, "cutoff_hz": None, "unit": None, "resolution": 0.0},
     }
     for hidden in (b"0.01", b"1.02", b"bias", b"delay"):
         assert hidden not in files["manoeuvre_bump.toml"]
@@ -193,6 +194,21 @@ def test_a_part_is_named_so_and_its_notes_say_why():
     assert list(nothing) == ["manoeuvre_wall.manoeuvre.json"]
 
 
+def test_a_sensor_s_unit_and_resolution_are_those_of_the_file():
+    """Oracle: degrees in steps of 0.01; the recording itself is in radians."""
+    sensors = SensorSet(sensors={"chassis.pitch": Sensor(unit="deg", resolution=0.01)})
+    campaign = Campaign.plan(PLANT, sensors, short("bump"))
+    [recording] = drive(campaign)
+    text = files_of(recording, campaign, "csv", DATE)["manoeuvre_bump.csv"].decode()
+    head, *rows = text.splitlines()
+    assert head == "time [s],chassis.pitch [deg]"
+    written = [row.split(",")[1] for row in rows]
+    assert max(len(value.lstrip("-")) for value in written) == len("0.12")
+    assert_allclose(
+        np.radians([float(value) for value in written]), recording.run["chassis.pitch"], atol=1e-12
+    )
+
+
 def test_mdf4_holds_the_recording_with_units_meaning_and_date():
     """Oracle: asammdf's own reader."""
     campaign = Campaign.plan(PLANT, SENSORS, short("bump"), seed=5)
@@ -207,7 +223,8 @@ def test_mdf4_holds_the_recording_with_units_meaning_and_date():
         assert set(names) == set(SENSORS.sensors)
         for name in SENSORS.sensors:
             signal = file.get(name)
-            assert signal.unit == channel(name).unit
+            assert signal.unit == SENSORS.units().get(name, channel(name).unit)
             assert channel(name).label in signal.comment
-            assert_array_equal(signal.samples, recording.run[name])
+            in_si = signal.samples * SENSORS.sensors[name].si_factor(name)
+            assert_allclose(in_si, recording.run[name], rtol=1e-15)
             assert_array_equal(signal.timestamps, recording.run.time)

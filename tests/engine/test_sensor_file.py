@@ -1,6 +1,7 @@
 """Files of sensors: what they say, and how mistakes are told."""
 
 import json
+import math
 import re
 
 import pytest
@@ -61,6 +62,14 @@ def test_without_sensors_the_usual_ones_are_ideal():
     assert set(SensorSet().sensors.values()) == {Sensor()}
 
 
+def test_noise_is_told_in_the_sensor_s_unit():
+    """Oracle: 0.5 mm = 5e-4 m, 0.02 deg = pi / 9000 rad."""
+    data = {"chassis.z": {"unit": "mm", "noise": 0.5}, "chassis.roll": {"unit": "°", "noise": 0.02}}
+    found = sensors_from_json({"sensors": data})
+    assert found.noise() == pytest.approx({"chassis.z": 5e-4, "chassis.roll": math.pi / 9000})
+    assert found.units() == {"chassis.z": "mm", "chassis.roll": "°"}
+
+
 def test_noise_alone_is_a_set_of_the_usual_sensors():
     found = noisy({"chassis.z": 1e-3}, "n.toml")
     assert found.noise() == {"chassis.z": 1e-3}
@@ -89,6 +98,9 @@ def test_noise_alone_is_a_set_of_the_usual_sensors():
         ({"sensors": {"chassis.z": {"delay": -0.1}}}, "delay is -0.1, but must lie between 0 and"),
         ({"sensors": {"chassis.z": {"rate_hz": 300}}}, "more than the recording's rate_hz of 200"),
         ({"sensors": {"chassis.z": {"cutoff_hz": 100}}}, "take less than 100, or leave the filter"),
+        ({"sensors": {"chassis.z": {"unit": "deg"}}}, "sensors.chassis.z.unit cannot be: "),
+        ({"sensors": {"chassis.z": {"unit": "mn"}}}, "sensors.chassis.z.unit cannot be: "),
+        ({"sensors": {"chassis.z": {"resolution": -1}}}, "resolution is -1, but must lie between"),
         ({"sensors": {"post.fl.z": {}}}, "post.fl.z is nothing that the concept car on a road has"),
         ({"sensors": {"seat.rear.a_z": {}}}, "add points.seat.rear = [x, y, z] in metres"),
         ({"points": {"boot": [0, 0, 0]}}, 'points.boot must be called "seat.NAME" or "point.NAME"'),

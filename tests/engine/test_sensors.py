@@ -47,6 +47,12 @@ def test_gain_bias_and_delay_are_those_of_the_definition():
     assert_allclose(values, expected, rtol=0, atol=1e-9)
 
 
+def test_a_reading_is_the_nearest_multiple_of_the_resolution():
+    """Oracle: the sine in mm, rounded to hundredths and shifted by the bias in mm."""
+    time, values = recorded(Sensor(unit="mm", bias=0.5, resolution=0.01))
+    assert_allclose(1e3 * values, np.round(1e3 * wave(time) + 0.5, 2), rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize(("frequency", "gain"), [(4.0, 1.0), (20.0, 2**-0.5), (60.0, 0.0123)])
 def test_the_anti_alias_filter_is_the_stated_butterworth(frequency, gain):
     """Oracle: |H| = (1 + (f/fc)^8)^-1/2 at 20 Hz; the bilinear transform moves a frequency f to
