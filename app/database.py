@@ -67,8 +67,9 @@ def _check_schema(connection: Connection, path: Path) -> None:
         metadata.create_all(connection)
         connection.execute(insert(schema_version).values(version=SCHEMA_VERSION))
     version = connection.execute(select(schema_version.c.version)).scalar_one()
-    if version == 1:
+    if version in (1, 2):
         metadata.create_all(connection)
+        connection.exec_driver_sql("ALTER TABLE measurements ADD COLUMN manoeuvre TEXT")
         connection.execute(update(schema_version).values(version=SCHEMA_VERSION))
     elif version != SCHEMA_VERSION:
         raise StartError(

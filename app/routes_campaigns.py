@@ -1,6 +1,8 @@
 """Campaigns: background jobs like identifications, whose recordings come as files."""
 
+import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import PurePath
 from typing import Any
 from zipfile import ZipFile
@@ -112,10 +114,12 @@ def _taken(services: Services, sid: str, jid: str) -> list[Measurement]:
 
 
 def _recorded(services: Services, job: Job, recording: Mapping[str, Any]) -> NewMeasurement:
-    """A whole recording with the noise that its notes state."""
+    """A whole recording with the noise that its notes state, and what was driven."""
     name = f"{recording['name']}.toml"
     noise = parse_notes(_read(services, job, name), name).noise
-    return recorded(_read(services, job, recording["file"]), recording["file"], noise)
+    new = recorded(_read(services, job, recording["file"]), recording["file"], noise)
+    driven = json.loads(_read(services, job, f"{recording['name']}.manoeuvre.json"))
+    return replace(new, manoeuvre=driven)
 
 
 def _ended(services: Services, sid: str, jid: str) -> Job:

@@ -8,7 +8,8 @@ from fastapi.responses import FileResponse
 from starlette.concurrency import run_in_threadpool
 
 from ..engine.channels import OUTPUT_CHANNELS
-from ..engine.errors import MeasurementError
+from ..engine.errors import ManoeuvreError, MeasurementError
+from ..engine.json_text import parse_json
 from ..engine.run_notes import parse_notes
 from . import frames
 from .access import SessionId
@@ -25,6 +26,7 @@ router = APIRouter(
 
 Recording = Annotated[Upload, Depends(receive("measurement.csv"))]
 Notes = Annotated[Upload, Depends(receive("notes.toml"))]
+Driven = Annotated[Upload, Depends(receive("manoeuvre.json"))]
 
 
 def measurement_to_json(kept: Measurement) -> dict[str, Any]:
@@ -37,6 +39,7 @@ def measurement_to_json(kept: Measurement) -> dict[str, Any]:
         "created": datetime.fromtimestamp(kept.created, UTC).isoformat(),
         "sample": kept.sample,
         "noise": kept.noise,
+        "manoeuvre": kept.manoeuvre,
         **kept.summary,
     }
 
@@ -119,6 +122,37 @@ def _note(services: Services, sid: str, kept: Measurement, received: Upload) -> 
         )
     run = parse(services.store.original(kept).read_bytes(), kept.name, noise)
     return services.store.set_noise(sid, kept.id, run.noise, summary(run))
+
+
+@router.put("/{mid}/manoeuvre", openapi_extra=openapi("application/json"))
+async def set_manoeuvre(
+    sid: SessionId, mid: str, services: Shared, received: Driven
+) -> dict[str, Any]:
+    """Take what was driven from a manoeuvre file, as the NAME.manoeuvre.json beside it."""
+    services.store.measurement(sid, mid)
+    async with services.parsing:
+        driven = await run_in_threadpool(_driven, services, received)
+    return measurement_to_json(services.store.set_manoeuvre(sid, mid, driven))
+
+
+def _driven(services: Services, received: Upload) -> dict[str, Any]:
+    # It brings scipy, which is loaded with the first simulation.
+    from ..engine.manoeuvre import manoeuvre_from_json, manoeuvre_to_json
+
+    data = received.read(services.settings.limits.body_bytes)
+    manoeuvre = manoeuvre_from_json(parse_json(data, received.name, ManoeuvreError), received.name)
+    if manoeuvre.kind != "road":
+        raise ManoeuvreError(
+            f'{received.name}: a recording is of a drive; give a manoeuvre of kind "road".'
+        )
+    return manoeuvre_to_json(manoeuvre)
+
+
+@router.delete("/{mid}/manoeuvre")
+def forget_manoeuvre(sid: SessionId, mid: str, services: Shared) -> dict[str, Any]:
+    """What was driven is not known."""
+    services.store.measurement(sid, mid)
+    return measurement_to_json(services.store.set_manoeuvre(sid, mid, None))
 
 
 @router.delete("/{mid}", status_code=204)

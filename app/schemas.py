@@ -220,14 +220,15 @@ class StartValues(WireForm):
 class ValidationRequest(WireForm):
     """Let the car of an identification that is done predict its runs, and others held out.
 
-    manoeuvres : by measurement, what was driven: a known manoeuvre's key or an object
+    manoeuvres : by measurement, what was driven in place of what is kept with it: a known
+        manoeuvre's key, an object, or null where it is not known
     braking : by measurement, as of an identification, which tells that of its own runs
     geometry : {"front": {"distance": m, "angle": rad}, "rear": ...}, one axle or both
     """
 
     identification: Name
     hold_out: Annotated[list[Name], Field(max_length=20)] = []
-    manoeuvres: Annotated[dict[Name, KeyOrObject], Field(max_length=40)] = {}
+    manoeuvres: Annotated[dict[Name, KeyOrObject | None], Field(max_length=40)] = {}
     braking: Annotated[dict[Name, Intervals], Field(max_length=40)] = {}
     geometry: JsonObject | None = None
     key: Name | None = None

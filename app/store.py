@@ -40,7 +40,7 @@ class Session:
 
 @dataclass(frozen=True)
 class Measurement:
-    """One uploaded recording: `summary` is what was found in it."""
+    """One uploaded recording: `summary` is what was found in it, `manoeuvre` what was driven."""
 
     id: str
     name: str
@@ -50,6 +50,7 @@ class Measurement:
     sample: bool
     noise: dict[str, float]
     summary: dict[str, Any]
+    manoeuvre: dict[str, Any] | None
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,7 @@ class NewMeasurement:
     summary: Mapping[str, Any]
     noise: Mapping[str, float]
     sample: bool = False
+    manoeuvre: Mapping[str, Any] | None = None
 
 
 class Store:
@@ -204,6 +206,7 @@ class Store:
                 sample=new.sample,
                 noise=json.dumps(dict(new.noise)),
                 summary=json.dumps(dict(new.summary)),
+                manoeuvre=_optional(new.manoeuvre),
             )
         )
         return measurement
@@ -256,11 +259,21 @@ class Store:
         summary: Mapping[str, Any],
     ) -> Measurement:
         """Keep the noise that is stated of a measurement, and what is found in it with that."""
+        told = {"noise": json.dumps(dict(noise)), "summary": json.dumps(dict(summary))}
+        return self._set_of(session, measurement, **told)
+
+    def set_manoeuvre(
+        self, session: str, measurement: str, manoeuvre: Mapping[str, Any] | None
+    ) -> Measurement:
+        """Keep what was driven in a measurement, None where it is not known."""
+        return self._set_of(session, measurement, manoeuvre=_optional(manoeuvre))
+
+    def _set_of(self, session: str, measurement: str, **values: Any) -> Measurement:
         with self.database.writing() as connection:
             connection.execute(
                 update(measurements)
                 .where(measurements.c.session == session, measurements.c.id == measurement)
-                .values(noise=json.dumps(dict(noise)), summary=json.dumps(dict(summary)))
+                .values(**values)
             )
         return self.measurement(session, measurement)
 
@@ -345,4 +358,9 @@ def _measurement(row: Row[Any]) -> Measurement:
         sample=row.sample,
         noise=json.loads(row.noise),
         summary=json.loads(row.summary),
+        manoeuvre=row.manoeuvre and json.loads(row.manoeuvre),
     )
+
+
+def _optional(data: Mapping[str, Any] | None) -> str | None:
+    return None if data is None else json.dumps(dict(data))

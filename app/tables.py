@@ -18,8 +18,8 @@ from sqlalchemy import (
     UniqueConstraint,
 )
 
-SCHEMA_VERSION = 2
-"""Version 1 had no files of jobs."""
+SCHEMA_VERSION = 3
+"""Version 1 had no files of jobs, version 2 no manoeuvres of measurements."""
 
 metadata = MetaData()
 
@@ -63,6 +63,7 @@ measurements = Table(
     Column("sample", Boolean, nullable=False, default=False),
     Column("noise", Text, nullable=False, default="{}"),
     Column("summary", Text, nullable=False),
+    Column("manoeuvre", Text),
 )
 
 jobs = Table(

@@ -5,7 +5,7 @@ the database nor the data directory and may be another machine.
 """
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -49,7 +49,6 @@ def check_and_fill(
     limits: Limits,
 ) -> dict[str, Any]:
     """Everything that the job needs, checked."""
-    from ..engine.manoeuvre import manoeuvre_to_json
     from ..engine.validation import check_cases, geometry_from_json
 
     if fitted.result is None:
@@ -66,29 +65,36 @@ def check_and_fill(
                 " out or add the run.",
                 field=field,
             )
+    kept = [store.measurement(session, one["id"]) for one in runs]
     spec = {
         "identification": fitted.id,
         "fit": fitted.result,
         "runs": runs,
         "braking": {**fitted.spec["braking"], **request.model_dump(mode="json")["braking"]},
-        "manoeuvres": {
-            one: manoeuvre_to_json(_manoeuvre(asked)) for one, asked in request.manoeuvres.items()
-        },
+        "manoeuvres": _driven(request, kept),
         "geometry": request.geometry,
     }
     if request.geometry is not None:
         geometry_from_json(request.geometry)
-    kept = [store.measurement(session, one["id"]) for one in runs]
     check_budget(kept, fitted.result["settings"]["step"], limits)
     check_cases(_cases(spec, _runs(spec, session, store, recordings)))
     return {**spec, "recorded": [{"name": one.name, "sha256": one.sha256} for one in kept]}
 
 
-def _manoeuvre(asked: Any) -> Any:
-    from ..engine.manoeuvre import manoeuvre_from_json
+def _driven(request: ValidationRequest, kept: Sequence[Measurement]) -> dict[str, Any]:
+    """Manoeuvres by measurement: those kept with them, unless the request tells others or none."""
+    from ..engine.manoeuvre import manoeuvre_from_json, manoeuvre_to_json
     from .excitation import known_manoeuvre
 
-    return known_manoeuvre(asked) if isinstance(asked, str) else manoeuvre_from_json(asked)
+    driven = {one.id: one.manoeuvre for one in kept}
+    for one, asked in request.manoeuvres.items():
+        if asked is None:
+            driven[one] = None
+        else:
+            known = isinstance(asked, str)
+            found = known_manoeuvre(asked) if known else manoeuvre_from_json(asked)
+            driven[one] = manoeuvre_to_json(found)
+    return {one: manoeuvre for one, manoeuvre in driven.items() if manoeuvre is not None}
 
 
 def _runs(spec: Mapping[str, Any], session: str, store: Store, recordings: Recordings) -> list[Any]:

@@ -1,8 +1,10 @@
 """Uploads: what was found in them, byte for byte back, and a sentence for every bad one."""
 
 import hashlib
+import json
 
 import pytest
+from ridetune.engine.manoeuvre import manoeuvre_to_json, reference_manoeuvres
 
 from .conftest import SAMPLES, Visitor, open_client, short_recording
 from .test_frames import read_binary
@@ -112,6 +114,38 @@ def test_notes_that_say_nothing_usable_are_refused(visitor, notes, said):
     assert visitor.put("/measurements/none/notes", content=notes).status_code == 404
     nameless = visitor.put(f"/measurements/{kept['id']}/notes", content=notes).json()["detail"]
     assert nameless == reply.json()["detail"].replace("lap.toml", "notes.toml")
+
+
+def test_what_was_driven_is_kept_with_a_recording_until_it_is_forgotten(visitor):
+    kept = visitor.upload(short_recording(), "lap.csv").json()
+    assert kept["manoeuvre"] is None
+    path, bump = f"/measurements/{kept['id']}/manoeuvre", reference_manoeuvres()["bump"]
+    told = visitor.put(path, content=json.dumps(manoeuvre_to_json(bump)).encode()).json()
+    assert told == kept | {"manoeuvre": manoeuvre_to_json(bump)}
+    assert visitor.get(f"/measurements/{kept['id']}").json() == told
+    assert visitor.delete(path).json() == kept
+
+
+@pytest.mark.parametrize(
+    ("manoeuvre", "said"),
+    [
+        (b"{", "lap.manoeuvre.json: line 1, column 2: not valid JSON"),
+        (b'{"nam": "lap"}', 'lap.manoeuvre.json: nam is not known; did you mean "name"?'),
+        (
+            json.dumps(manoeuvre_to_json(reference_manoeuvres()["heave"])).encode(),
+            'lap.manoeuvre.json: a recording is of a drive; give a manoeuvre of kind "road".',
+        ),
+    ],
+)
+def test_a_manoeuvre_that_cannot_have_been_driven_is_refused(visitor, manoeuvre, said):
+    kept = visitor.upload(short_recording(), "lap.csv").json()
+    path = f"/measurements/{kept['id']}/manoeuvre?name=lap.manoeuvre.json"
+    reply = visitor.put(path, content=manoeuvre)
+    assert (reply.status_code, reply.json()["code"]) == (422, "manoeuvre")
+    assert said in reply.json()["detail"]
+    assert visitor.get(f"/measurements/{kept['id']}").json() == kept
+    nowhere = visitor.put("/measurements/none/manoeuvre", content=manoeuvre)
+    assert nowhere.status_code == 404
 
 
 BAD_FILES = {

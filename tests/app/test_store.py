@@ -97,20 +97,25 @@ def test_a_database_of_another_version_is_refused(tmp_path):
     DataDirectory(tmp_path).close()
 
 
-def test_a_database_from_before_jobs_made_files_is_taken_over(tmp_path):
-    """Oracle: what version 1 kept; afterwards it keeps files like any other."""
+@pytest.mark.parametrize("version", [1, 2])
+def test_a_database_of_an_earlier_version_is_taken_over(tmp_path, version):
+    """Oracle: what it kept; afterwards it keeps files of jobs and manoeuvres like any other."""
     store = Store(tmp_path, Limits())
     session, _ = store.create_session(CAR, [recording()])
     done, job = queued(store, session), queued(store, session)
     store.jobs.finish(done, "done", result={"cost": 1.5})
     store.close()
     with sqlite3.connect(tmp_path / "ridetune.sqlite") as connection:
-        connection.execute("DROP TABLE job_files")
-        connection.execute("UPDATE schema_version SET version = 1")
+        connection.execute("ALTER TABLE measurements DROP COLUMN manoeuvre")
+        if version == 1:
+            connection.execute("DROP TABLE job_files")
+        connection.execute("UPDATE schema_version SET version = ?", [version])
     connection.close()
     store = Store(tmp_path, Limits())
     assert store.jobs.get(session, done).result == {"cost": 1.5}
-    assert len(store.measurements(session)) == 1
+    [kept] = store.measurements(session)
+    assert kept.manoeuvre is None
+    assert store.set_manoeuvre(session, kept.id, {"name": "lap"}).manoeuvre == {"name": "lap"}
     assert store.finish_job(job, "done", result={}, file=b"rows")
     store.close()
 

@@ -1,5 +1,6 @@
 """Validations over REST: from a finished identification to the report, by real workers."""
 
+import json
 import time
 
 import pytest
@@ -70,6 +71,22 @@ def test_the_held_out_run_is_predicted_to_its_noise(engineer, runs, done):
     shown = done["result"]["runs"][1]["predictions"]
     assert [one["scores"] for one in shown] == [one["scores"] for one in held["predictions"]]
     assert len(document["made"]["recordings"]) == 2
+
+
+def test_what_is_kept_with_a_run_is_driven_unless_the_request_tells_otherwise(
+    engineer, runs, fitted
+):
+    two = manoeuvre_to_json(reference_manoeuvres()["2"])
+    bump = manoeuvre_to_json(reference_manoeuvres()["bump"])
+    path = f"/measurements/{runs[1]}/manoeuvre"
+    assert engineer.put(path, content=json.dumps(two).encode()).status_code == 200
+    told = [({}, {runs[1]: two}), ({runs[1]: None}, {}), ({runs[1]: "bump"}, {runs[1]: bump})]
+    for manoeuvres, driven in told:
+        asked = {"identification": fitted, "hold_out": runs[1:], "manoeuvres": manoeuvres}
+        job = engineer.post("/validations", json=asked).json()
+        assert job["manoeuvres"] == driven
+        engineer.post(f"/validations/{job['id']}/cancel")
+    engineer.delete(path)
 
 
 def test_the_report_is_served_in_a_sandbox(engineer, done):
