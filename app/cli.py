@@ -8,8 +8,11 @@ imported by the command that runs, so that help is quick.
 import argparse
 import os
 import re
+import signal
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+import threading
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from difflib import get_close_matches
 from importlib.metadata import version
 from pathlib import Path
@@ -20,6 +23,7 @@ from ..engine.errors import RideError
 BAD_INPUT = 2
 INTERRUPTED = 130  # 128 + SIGINT, as shells report it
 PIPE_CLOSED = 141  # 128 + SIGPIPE
+TERMINATED = 143  # 128 + SIGTERM
 LARGEST_SEED = 2**53
 
 
@@ -30,11 +34,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.refuse_unknown(arguments)
     options = parser.parse_args(arguments)
     try:
-        options.run(options)
+        with _termination_interrupts():
+            options.run(options)
         sys.stdout.flush()
     except RideError as error:
         print("ridetune:", " ".join(str(error).split()), file=sys.stderr)
         return BAD_INPUT
+    except _Terminated:
+        return TERMINATED
     except KeyboardInterrupt:
         return INTERRUPTED
     except BrokenPipeError:
@@ -42,6 +49,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return PIPE_CLOSED
     return 0
+
+
+class _Terminated(KeyboardInterrupt):
+    """SIGTERM has arrived."""
+
+
+@contextmanager
+def _termination_interrupts() -> Iterator[None]:
+    """SIGTERM goes the way of an interrupt, so that no half file and no process is left behind."""
+
+    def raise_it(number: int, frame: object) -> NoReturn:
+        raise _Terminated
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    kept = signal.signal(signal.SIGTERM, raise_it)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, kept)
 
 
 def command_line() -> "Parser":

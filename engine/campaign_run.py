@@ -149,10 +149,11 @@ def _in_processes(
 
 @contextmanager
 def _interrupts_later() -> Iterator[None]:
-    """An interrupt waits for the block's end; processes that start meanwhile never see one, since
-    interrupts are their parent's business.
+    """An interrupt waits for the block's end, for a process that is half started dies loudly.
+
+    Processes that start meanwhile never see SIGINT, which is their parent's business.
     """
-    kept = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    kept = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     try:
         yield
     finally:
@@ -167,6 +168,7 @@ def _begin(news: Any, stop: Any) -> None:
     """In a process of its own, first."""
     global _news, _stop
     _news, _stop = news, stop
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
 
 
 def _record(campaign: Campaign, name: str) -> Recording:
@@ -179,4 +181,8 @@ def _record(campaign: Campaign, name: str) -> Recording:
             told = time.monotonic()
             _news.put((name, seconds))
 
-    return campaign.record(name, progress, _stop.is_set)
+    def stopped() -> bool:
+        return _stop.is_set() or not (parent and parent.is_alive())
+
+    parent = multiprocessing.parent_process()
+    return campaign.record(name, progress, stopped)

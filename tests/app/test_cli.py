@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 import urllib.request
 from importlib.metadata import version
 from pathlib import Path
@@ -543,8 +544,16 @@ def test_interrupt_ends_quietly(folder):
         assert waiting.stderr.read() == ""
 
 
-def test_an_interrupted_campaign_says_what_is_written(folder):
-    """Interrupted with its processes, as a terminal does, while these are still starting."""
+@pytest.mark.parametrize(
+    ("stop", "status"),
+    [
+        (lambda command: os.killpg(command, signal.SIGINT), 130),
+        (lambda command: os.kill(command, signal.SIGTERM), 143),
+    ],
+    ids=["interrupted with its processes", "terminated alone"],
+)
+def test_a_stopped_campaign_says_what_is_written_and_leaves_no_process(folder, stop, status):
+    """As a terminal and as a service manager does, while the processes are still starting."""
     listening = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
     program = [sys.executable, "-c", listening + PROGRAM]
     options = ["--manoeuvre", "1", "bump", "--processes", "2", "-o", "runs"]
@@ -557,11 +566,22 @@ def test_an_interrupted_campaign_says_what_is_written(folder):
         children = Path(f"/proc/{running.pid}/task/{running.pid}/children")
         while len(children.read_text().split()) < 3:  # the drives' and the resource tracker
             pass
-        os.killpg(running.pid, signal.SIGINT)
-        assert running.wait(timeout=60) == 130
+        stop(running.pid)
+        assert running.wait(timeout=60) == status
         told = "Interrupted: nothing written whole, manoeuvre_1, manoeuvre_bump not.\n"
         assert running.stderr.read() == told
     assert sorted(os.listdir("runs")) == ["truth.json", "vehicle.json"]
+    assert any(gone(running.pid) for _ in range(100))
+
+
+def gone(group: int) -> bool:
+    """Whether a process group has ended; Python's resource tracker does so just after a command."""
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return True
+    time.sleep(0.1)
+    return False
 
 
 def test_serve_answers_until_interrupted(folder):

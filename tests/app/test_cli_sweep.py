@@ -156,7 +156,8 @@ def test_progress_is_a_line_now_and_then_where_no_terminal_shows_it(capsys, monk
     assert capsys.readouterr().err == told
 
 
-def test_an_interrupted_sweep_leaves_no_file(folder):
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_an_interrupted_sweep_leaves_no_file(folder, number, status):
     """Interrupted while it writes: its own file is there already, hidden under another name."""
     listening = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
     program = [sys.executable, "-c", listening + PROGRAM]
@@ -164,7 +165,7 @@ def test_an_interrupted_sweep_leaves_no_file(folder):
     with subprocess.Popen([*program, *asked], stderr=subprocess.PIPE, text=True) as running:
         while running.poll() is None and not os.listdir():
             pass
-        running.send_signal(signal.SIGINT)
-        assert running.wait(timeout=60) == 130
+        running.send_signal(number)
+        assert running.wait(timeout=60) == status
         assert running.stderr.read() == ""
     assert os.listdir() == []
