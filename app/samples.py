@@ -10,8 +10,9 @@ from .package_files import package_folder
 from .recordings import summary
 from .store import NewMeasurement
 
-VEHICLE = "detailed_vehicle.json"
-RUNS = ("detailed_manoeuvre_1.csv", "detailed_manoeuvre_2.csv")
+FOLDER = "detailed"
+VEHICLE = "vehicle.json"
+RUNS = ("manoeuvre_1.csv", "manoeuvre_2.csv")
 
 
 @dataclass(frozen=True)
@@ -27,13 +28,23 @@ def sample_project() -> SampleProject:
     """The project as it comes with the package."""
     from ..engine.vehicle_file import read_vehicle, vehicle_to_json
 
-    folder = package_folder("sample_runs")
+    folder = package_folder("sample_runs") / FOLDER
     vehicle = vehicle_to_json(read_vehicle(folder / VEHICLE))
     return SampleProject(vehicle, tuple(_sample(folder / name) for name in RUNS))
 
 
 def _sample(path: Path) -> NewMeasurement:
+    """A recording with its notes and its manoeuvre, called after its folder too."""
+    from ..engine.manoeuvre import manoeuvre_to_json, read_manoeuvre
     from ..engine.measurement import read_run
+    from ..engine.validation import manoeuvre_beside
 
     run = read_run(path)
-    return NewMeasurement(path.name, path.read_bytes(), summary(run), dict(run.noise), sample=True)
+    return NewMeasurement(
+        f"{FOLDER}_{path.name}",
+        path.read_bytes(),
+        summary(run),
+        dict(run.noise),
+        sample=True,
+        manoeuvre=manoeuvre_to_json(read_manoeuvre(manoeuvre_beside(path))),
+    )

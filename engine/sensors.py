@@ -138,7 +138,7 @@ def _readings(
     factor = sensor.si_factor(name)
     values += factor * (sensor.bias + sensor.noise * random.standard_normal(instants.size))
     if step := factor * sensor.resolution:
-        values = step * np.round(values / step)
+        values = step * np.round(values / step) + 0.0  # no -0
     return values[tick]
 
 

@@ -117,10 +117,14 @@ export function upload(file) {
 export const measurements = () => json("GET", `${base}/measurements`);
 export const deleteMeasurement = (id) => json("DELETE", `${base}/measurements/${id}`);
 /** Take a measurement's noise from a NAME.toml. */
-export function attachNotes(id, file) {
+export const attachNotes = (id, file) => attach(id, "notes", file);
+/** Take what was driven from a NAME.manoeuvre.json. */
+export const attachManoeuvre = (id, file) => attach(id, "manoeuvre", file);
+export const forgetManoeuvre = (id) => json("DELETE", `${base}/measurements/${id}/manoeuvre`);
+function attach(id, what, file) {
   const form = new FormData();
   form.append("file", file, file.name);
-  return json("PUT", `${base}/measurements/${id}/notes`, { body: form });
+  return json("PUT", `${base}/measurements/${id}/${what}`, { body: form });
 }
 export const originalUrl = (id) => `${base}/measurements/${id}/original`;
 export function measurement(id, channelNames, maxSamples, decimate = "stride") {

@@ -1,4 +1,5 @@
-// Measured rides: add by button or by dropping files, with notes on their noise; look, delete.
+// Measured rides: add by button or by dropping files, with notes on their noise and with what was
+// driven; look, delete.
 
 import * as api from "./api.js";
 import { $, breakable, h, inPlace } from "./dom.js";
@@ -24,9 +25,9 @@ export function build(callbacks) {
   parts.list = h("div");
   parts.detail = h("div", { className: "measurement-detail scrolls" });
   parts.file = h("input", {
-    type: "file", id: "file", multiple: true, accept: ".csv,.txt,.toml,text/csv", className: "hidden-file",
+    type: "file", id: "file", multiple: true, accept: ".csv,.txt,.toml,.json,text/csv", className: "hidden-file",
     "aria-label": "Measurement files",
-    on: { change: () => { add([...parts.file.files]); parts.file.value = ""; } },
+    on: { change: () => { sort([...parts.file.files]); parts.file.value = ""; } },
   });
   $("#measurements").append(h("div", { className: "measurements" },
     h("div", { className: "measurement-list scrolls" }, parts.list, hooks.campaign), parts.detail));
@@ -47,27 +48,37 @@ export function build(callbacks) {
     event.preventDefault();
     depth = 0;
     drop.hidden = true;
-    const files = [...event.dataTransfer.files];
-    const isVehicle = (file) => file.name.toLowerCase().endsWith(".json");
-    files.filter(isVehicle).forEach(hooks.takeVehicle);
-    const recordings = files.filter((file) => !isVehicle(file));
-    if (!recordings.length) return;
-    hooks.open();
-    add(recordings);
+    sort([...event.dataTransfer.files]);
   });
   on("measurements", show);
   show();
 }
 
+/** What tells of a recording lies beside it: NAME.toml and NAME.manoeuvre.json. */
+const BESIDE = {
+  notes: { end: /\.toml$/i, attach: api.attachNotes, told: "noise", say: sentence },
+  manoeuvre: { end: /\.manoeuvre\.json$/i, attach: api.attachManoeuvre, told: "manoeuvre", say: driven },
+};
+const beside = ({ name }) => Object.values(BESIDE).find(({ end }) => end.test(name));
+
+/** Another JSON file is a vehicle; all else belongs here. */
+function sort(files) {
+  const isVehicle = (file) => /\.json$/i.test(file.name) && !beside(file);
+  files.filter(isVehicle).forEach(hooks.takeVehicle);
+  const ours = files.filter((file) => !isVehicle(file));
+  if (!ours.length) return;
+  hooks.open();
+  add(ours);
+}
+
 async function add(files) {
   failures = [];
-  const isNotes = ({ name }) => /\.toml$/i.test(name);
-  // Notes come after the recordings that they may belong to.
-  for (const file of [...files].sort((one, other) => isNotes(one) - isNotes(other))) {
+  // What lies beside recordings comes after those that it may belong to.
+  for (const file of [...files].sort((one, other) => Boolean(beside(one)) - Boolean(beside(other)))) {
     parts.busy = file.name;
     show();
     try {
-      await (isNotes(file) ? attach(file) : take(file));
+      await (beside(file) ? attach(file, beside(file)) : take(file));
     } catch (error) {
       failures.push({ name: file.name, error });
       if (error.lost) set({ online: false });
@@ -110,18 +121,37 @@ function showWarnings(id) {
   list.focus({ preventScroll: true });
 }
 
-/** NAME.toml states the noise of NAME.csv, of the newest where several are called so. */
-async function attach(file) {
-  const stem = (name) => name.replace(/\.\w+$/, "");
-  const row = get("measurements").findLast(({ name }) => stem(name) === stem(file.name));
+/** It tells of NAME.csv, of the newest where several are called so. */
+async function attach(file, { end, attach: send, told, say }) {
+  const stem = file.name.replace(end, "");
+  const row = get("measurements").findLast(({ name }) => name.replace(/\.\w+$/, "") === stem);
   if (!row) {
-    throw new Error(`No recording here is called ${stem(file.name)}.csv, whose noise it could ` +
+    throw new Error(`No recording here is called ${stem}.csv, whose ${told} it could ` +
       "state; add the recording first, or with it.");
   }
-  const noted = await api.attachNotes(row.id, file);
-  set({ measurements: get("measurements").map((one) => (one.id === row.id ? noted : one)) });
+  const noted = await send(row.id, file);
+  changed(noted);
   selected = row.id;
-  notice("info", `${file.name} belongs to ${nameOf(row.id)}`, sentence(noted));
+  notice("info", `${file.name} belongs to ${nameOf(row.id)}`, say(noted));
+}
+
+function changed(row) {
+  set({ measurements: get("measurements").map((one) => (one.id === row.id ? row : one)) });
+}
+
+/** What was driven in a recording. */
+function driven({ manoeuvre }) {
+  return manoeuvre ? `Driven: ${manoeuvre.name}.`
+    : "What was driven is not known; add the NAME.manoeuvre.json beside its NAME.csv to tell.";
+}
+
+async function forget(row) {
+  try {
+    changed(await api.forgetManoeuvre(row.id));
+  } catch (error) {
+    if (error.lost) set({ online: false });
+    else notice("error", `${row.name} keeps its manoeuvre`, error.message);
+  }
 }
 
 function show() {
@@ -203,6 +233,9 @@ function detail(row) {
     h("div", { className: "row-tools" }, choice, facts),
     drawing,
     h("p", { className: "hint" }, sentence(row)),
+    h("p", { className: "hint" }, driven(row), row.manoeuvre
+      ? [" ", h("button", { type: "button", title: "It was another road, or another drive",
+        on: { click: () => forget(row) } }, "Forget")] : null),
     ...(row.warnings.length
       ? [h("ul", { className: "warnings", tabIndex: -1 }, row.warnings.map((text) => h("li", {}, text)))] : []),
     ...(row.usable_for_identification ? [] : [h("p", { className: "hint" },

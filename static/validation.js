@@ -9,9 +9,12 @@ import { unseen } from "./setup.js";
 import { get, on, set } from "./store.js";
 import { sections } from "./validation_view.js";
 
+/** The choice of what is kept with the recording. */
+const KEPT = "kept";
+
 /** The role of each run that the fit has not seen, and what was driven, as they were chosen. */
 const left = new Set();
-const driven = {};
+const told = {};
 
 let job = null;
 let found = null;
@@ -55,7 +58,7 @@ async function start() {
     job = await api.validate({
       identification: get("fitJob").id,
       hold_out: held,
-      manoeuvres: Object.fromEntries(chosen.filter((id) => driven[id]).map((id) => [id, driven[id]])),
+      manoeuvres: Object.fromEntries(chosen.filter((id) => id in told).map((id) => [id, told[id]])),
       braking: brakingOf(held),
     });
     found = null;
@@ -134,11 +137,17 @@ function runRow(run, role) {
   const manoeuvres = get("manoeuvres").filter(({ kind }) => kind !== "posts");
   const choice = h("select", { "aria-label": `Manoeuvre of ${nameOf(run.id)}`,
     title: "Where the very manoeuvre and road are known, the run is predicted over its road as well",
-    on: { change: () => { driven[run.id] = choice.value; } } },
-  h("option", { value: "" }, "manoeuvre not known"),
-  manoeuvres.map(({ key, name }) => h("option", { value: key, selected: driven[run.id] === key }, name)));
+    on: { change: () => tell(run.id, choice.value) } },
+  run.manoeuvre ? h("option", { value: KEPT }, `as told: ${run.manoeuvre.name}`) : null,
+  h("option", { value: "", selected: told[run.id] === null }, "manoeuvre not known"),
+  manoeuvres.map(({ key, name }) => h("option", { value: key, selected: told[run.id] === key }, name)));
   return h("li", {}, h("span", { className: "run-name", title: nameOf(run.id) }, nameOf(run.id)),
     h("span", { className: "run-use" }, role, choice));
+}
+
+function tell(id, value) {
+  if (value === KEPT) delete told[id];
+  else told[id] = value || null;
 }
 
 function held(run) {

@@ -127,8 +127,8 @@ def growth(bench: Workbench) -> Row:
 def identification(bench: Workbench) -> Row:
     """Twelve parameters from both runs of the paper twin, by the clock."""
     folder = package_folder("sample_runs")
-    car = read_vehicle(folder / "paper_vehicle.json")
-    runs = [read_run(folder / f"paper_twin_{number}.csv") for number in (1, 2)]
+    car = read_vehicle(folder / "twin/vehicle.json")
+    runs = [read_run(folder / f"twin/manoeuvre_{number}.csv") for number in (1, 2)]
     problem = Problem.build(car, runs, start=START)
     timing = bench.pace.measure(lambda: identify(problem), clock=time.perf_counter)
     fit = identify(problem)

@@ -116,7 +116,7 @@ def posts_mode() -> Mode:
 
 def rims_mode() -> Mode:
     """The recording of Manoeuvre 2 that comes along, its samples on the steps."""
-    run = read_run(package_folder("sample_runs") / "paper_twin_2.csv")
+    run = read_run(package_folder("sample_runs") / "twin/manoeuvre_2.csv")
     settings = RimsSettings()
     usual = prepare(run, the_car(), settings)
     fine = prepare(run, the_car(), replace(settings, step=settings.step / FINER))

@@ -14,7 +14,7 @@ from ridetune.engine.measurement import read_run, write_run
 from .test_cli import refused
 
 SAMPLES = Path(__file__).parents[2] / "sample_runs"
-TWIN = [str(SAMPLES / f"paper_twin_{number}.csv") for number in (1, 2)]
+TWIN = [str(SAMPLES / f"twin/manoeuvre_{number}.csv") for number in (1, 2)]
 COMMAND = f"validate {TWIN[0]} --hold-out {TWIN[1]} --vehicle paper"
 # Springs alone are found within seconds; all else is the twin's own.
 QUICK = "--free K_F K_R --start K_F=30000"
@@ -46,16 +46,17 @@ class Elements(HTMLParser):
 def test_a_held_out_run_is_predicted_over_its_road(folder, capsys):
     """Oracle: the twin's car drove both; what is missed is the noise that was added to z."""
     (folder / "pivots.json").write_text('{"rear": {"distance": 1.1, "angle": 0.1745}}')
-    known = "--manoeuvre paper_twin_2.csv=2 --geometry pivots.json"
+    known = "--manoeuvre manoeuvre_2.csv=2 --geometry pivots.json"
     assert main(f"{COMMAND} {QUICK} {known} -o r.html --json r.json".split()) == 0
     printed = capsys.readouterr()
     assert printed.err == ""
-    assert re.search(r"paper_twin_2\.csv \(held out\) +road \+ torque +8-DOF +96\.", printed.out)
+    assert re.search(r"manoeuvre_2\.csv \(held out\) +road \+ torque +8-DOF +96\.", printed.out)
     document = json.loads((folder / "r.json").read_text())
     fitted, held = document["runs"]
-    assert [one["mode"] for one in fitted["predictions"]] == ["rims", "rims"]
     assert held["manoeuvre"]["seed"] == 2
-    for one in held["predictions"]:
+    for run in (fitted, held):
+        assert [one["mode"] for one in run["predictions"]] == ["rims", "rims", "road", "road"]
+    for one in (*fitted["predictions"], *held["predictions"]):
         if one["model"] == "8dof":
             assert_allclose(one["scores"]["chassis.z"]["rms_error"], 0.5e-3, rtol=0.045)
     assert document["geometry"]["rear.pivot.distance"] == 1.1
@@ -94,12 +95,12 @@ def test_the_manoeuvre_beside_a_recording_is_taken_and_texts_stay_texts(folder):
     ("arguments", "sentence"),
     [
         (f"--hold-out {TWIN[0]}", "is to be held out, but the car is fitted to it"),
-        ("--manoeuvre paper_twin_1.csv=3", "nor a manoeuvre of that name"),
-        ("--manoeuvre paper_twin_1.csv=heave", "moves the posts of a rig"),
-        ("--manoeuvre paper_twin_3.csv=1", "there is no run paper_twin_3.csv"),
+        ("--manoeuvre manoeuvre_1.csv=3", "nor a manoeuvre of that name"),
+        ("--manoeuvre manoeuvre_1.csv=heave", "moves the posts of a rig"),
+        ("--manoeuvre manoeuvre_3.csv=1", "there is no run manoeuvre_3.csv"),
         ("--manoeuvre 1", "names no run or no manoeuvre"),
-        ("--manoeuvre paper_twin_1.csv=bump", "count the run's time from the manoeuvre's"),
-        ("--manoeuvre paper_twin_1.csv=1 paper_twin_1.csv=2", "give it one"),
+        ("--manoeuvre manoeuvre_1.csv=bump", "count the run's time from the manoeuvre's"),
+        ("--manoeuvre manoeuvre_1.csv=1 manoeuvre_1.csv=2", "give it one"),
         ("--geometry bad.json", 'front.distanc is not known; did you mean "distance"?'),
         ("--geometry gone.json", "cannot be read"),
         ("--hold-out lacking.csv", "lacks wheel.rr.z"),

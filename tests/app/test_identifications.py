@@ -39,10 +39,10 @@ def wait_for(visitor: Visitor, job: str, *states: str) -> dict:
 
 def test_two_parameters_come_back_from_the_twins_recording(engineer):
     """Oracle: the car the recording was simulated with; four standard errors of tolerance."""
-    truth = read_vehicle(SAMPLES / "paper_vehicle.json")
+    truth = read_vehicle(SAMPLES / "twin/vehicle.json")
     names = ["front.suspension.stiffness", "rear.suspension.damping"]
     start = {name: 1.3 * truth.value(name) for name in names}
-    recording = SAMPLES / "paper_twin_1.csv"
+    recording = SAMPLES / "twin/manoeuvre_1.csv"
     run = engineer.upload(recording.read_bytes(), recording.name).json()
     asked = {
         "vehicle": vehicle_to_json(truth),
@@ -66,7 +66,7 @@ def test_two_parameters_come_back_from_the_twins_recording(engineer):
 
 
 def test_marked_braking_and_settings_are_used_and_kept(engineer):
-    recording = SAMPLES / "paper_twin_2.csv"
+    recording = SAMPLES / "twin/manoeuvre_2.csv"
     run = engineer.upload(recording.read_bytes(), recording.name).json()["id"]
     asked = {
         "runs": [run],
@@ -120,7 +120,7 @@ def test_a_start_too_stiff_for_the_step_is_refused_with_one_that_it_takes(engine
     """Oracle: the step that the refusal states is taken."""
     run = engineer.get("/measurements").json()[0]["id"]
     asked = {"runs": [run], "free": ["rear.suspension.stiffness"]}
-    car = read_vehicle(SAMPLES / "paper_vehicle.json")
+    car = read_vehicle(SAMPLES / "twin/vehicle.json")
     asked["vehicle"] = vehicle_to_json(car.with_values({"front.suspension.damping": 2e5}))
     refused = engineer.post("/identifications", json=asked)
     assert (refused.status_code, "too long for this car" in refused.text) == (422, True)
@@ -141,7 +141,7 @@ def test_a_running_identification_is_cancelled(engineer):
 
 def test_after_a_kill_nothing_is_left_behind_and_nothing_is_lost(tmp_path):
     """Workers go with the service; uploads are byte-exact; acknowledged jobs run after all."""
-    recording = (SAMPLES / "paper_twin_1.csv").read_bytes()
+    recording = (SAMPLES / "twin/manoeuvre_1.csv").read_bytes()
     with LiveService(tmp_path) as service:
         visitor = Visitor(service.client)
         run = visitor.upload(recording, "twin.csv").json()["id"]

@@ -251,6 +251,6 @@ def test_a_full_session_asks_to_delete_one(small_limits):
 
 
 def test_a_sample_run_uploads_like_any_other_file(visitor):
-    file = SAMPLES / "detailed_manoeuvre_1.csv"
+    file = SAMPLES / "detailed/manoeuvre_1.csv"
     kept = visitor.upload(file.read_bytes(), file.name).json()
     assert kept["sha256"] in {one["sha256"] for one in visitor.get("/measurements").json()[:-1]}

@@ -89,7 +89,7 @@ def test_a_recording_is_followed_on_its_rims(driver, recording):
 def test_a_recording_is_prepared_as_the_request_says(driver):
     """Oracle: the engine, told the same; each of the three changes what comes out, and nothing is
     left of them when the first is asked for again."""
-    path = SAMPLES / "paper_twin_1.csv"
+    path = SAMPLES / "twin/manoeuvre_1.csv"
     recording = driver.upload(path.read_bytes(), "twin.csv").json()["id"]
     car, run = vehicle_from_json(PAPER), replace(read_run(path), braking=((2.0, 6.0),))
     told = {"rim_cutoff_hz": 8.0, "a_x_cutoff_hz": None, "initial_state": "measured"}

@@ -34,8 +34,8 @@ def ended(visitor: Visitor, path: str) -> dict:
 @pytest.fixture(scope="module")
 def runs(engineer) -> list[str]:
     """Both of the twin's runs, uploaded."""
-    files = [f"paper_twin_{number}.csv" for number in (1, 2)]
-    return [engineer.upload((SAMPLES / name).read_bytes(), name).json()["id"] for name in files]
+    files = [SAMPLES / f"twin/manoeuvre_{number}.csv" for number in (1, 2)]
+    return [engineer.upload(file.read_bytes(), file.name).json()["id"] for file in files]
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def test_the_held_out_run_is_predicted_to_its_noise(engineer, runs, done):
     assert done["manoeuvres"] == {runs[1]: manoeuvre_to_json(reference_manoeuvres()["2"])}
     document = engineer.get(f"/validations/{done['id']}/result.json").json()
     held = document["runs"][1]
-    assert (held["name"], held["role"]) == ("paper_twin_2.csv", "hold-out")
+    assert (held["name"], held["role"]) == ("manoeuvre_2.csv", "hold-out")
     for one in held["predictions"]:
         if one["model"] == "8dof":
             assert one["scores"]["chassis.z"]["rms_error"] == pytest.approx(0.5e-3, rel=0.045)
@@ -77,10 +77,10 @@ def test_what_is_kept_with_a_run_is_driven_unless_the_request_tells_otherwise(
     engineer, runs, fitted
 ):
     two = manoeuvre_to_json(reference_manoeuvres()["2"])
-    bump = manoeuvre_to_json(reference_manoeuvres()["bump"])
+    one = manoeuvre_to_json(reference_manoeuvres()["1"])
     path = f"/measurements/{runs[1]}/manoeuvre"
     assert engineer.put(path, content=json.dumps(two).encode()).status_code == 200
-    told = [({}, {runs[1]: two}), ({runs[1]: None}, {}), ({runs[1]: "bump"}, {runs[1]: bump})]
+    told = [({}, {runs[1]: two}), ({runs[1]: None}, {}), ({runs[1]: "1"}, {runs[1]: one})]
     for manoeuvres, driven in told:
         asked = {"identification": fitted, "hold_out": runs[1:], "manoeuvres": manoeuvres}
         job = engineer.post("/validations", json=asked).json()

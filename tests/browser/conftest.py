@@ -6,6 +6,7 @@ does not expect fails it.
 """
 
 import io
+import json
 import os
 import re
 import signal
@@ -183,6 +184,15 @@ def add_file(visitor: Visitor, name: str, data: bytes) -> None:
     visitor.page.set_input_files("#file", [{"name": name, "mimeType": "text/csv", "buffer": data}])
 
 
+def take_car_without_brakes(visitor: Visitor) -> None:
+    """Add the sample car's file, less its brakes, as one more file."""
+    car = json.loads((SAMPLES / "detailed/vehicle.json").read_text())
+    del car["brakes"]
+    visitor.click("#tab-measurements")
+    add_file(visitor, "car.json", json.dumps(car).encode())
+    visitor.until("ridetune.state('vehicle').brakes == null")
+
+
 def changed_pixels(one: np.ndarray, other: np.ndarray) -> float:
     """Share of the pixels that differ visibly."""
     return float(np.mean(np.abs(one.astype(int) - other).max(axis=2) > 24))
@@ -255,5 +265,5 @@ def spectator(visit, service) -> Visitor:
 
 def short_run(samples: int = 700, first: int = 900) -> bytes:
     """Some seconds of the first sample run, from the torque's start on."""
-    lines = (SAMPLES / "detailed_manoeuvre_1.csv").read_bytes().split(b"\n")
+    lines = (SAMPLES / "detailed/manoeuvre_1.csv").read_bytes().split(b"\n")
     return b"\n".join([lines[0], *lines[1 + first : 1 + first + 2 * samples : 2]]) + b"\n"

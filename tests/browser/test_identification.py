@@ -233,7 +233,7 @@ def test_files_of_one_name_are_told_apart(visitor):
 def test_the_same_data_is_kept_once_and_never_scored_as_unseen(visitor):
     """The second copy comes by REST, which keeps what it is sent."""
     visitor.click("#tab-measurements")
-    data = (SAMPLES / "detailed_manoeuvre_1.csv").read_bytes()
+    data = (SAMPLES / "detailed/manoeuvre_1.csv").read_bytes()
     add_file(visitor, "monday.csv", data)
     notice = visitor.element(".notice")
     visitor.wait(notice.is_visible, "it is told")

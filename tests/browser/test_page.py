@@ -6,7 +6,7 @@ import signal
 import numpy as np
 import pytest
 
-from .conftest import SAMPLES, Service, add_file, changed_pixels
+from .conftest import SAMPLES, Service, add_file, changed_pixels, take_car_without_brakes
 
 pytestmark = pytest.mark.browser
 
@@ -63,7 +63,7 @@ def test_a_ride_is_never_shown_with_the_road_of_another(spectator):
     Oracle: the picture of the ride before. A road that cannot be driven leaves the car at rest.
     """
     spectator.expect("status of 422")
-    wheels, rest = (SAMPLES / "detailed_manoeuvre_1.csv").read_bytes().split(b"\n", 1)
+    wheels, rest = (SAMPLES / "detailed/manoeuvre_1.csv").read_bytes().split(b"\n", 1)
     wrong = re.sub(rb"(wheel\.\w+\.z) \[mm\]", rb"\1 [m]", wheels) + b"\n" + rest
     add_file(spectator, "in_metres.csv", wrong)
     spectator.until("ridetune.state('measurements').length === 3")
@@ -271,7 +271,8 @@ def test_another_car_changes_sliders_and_scene(spectator):
 
 
 def test_brakes_and_drive_are_chosen_on_the_page(visitor):
-    """The sample car comes without brakes and with its rear axle driven; a car must be driven."""
+    """A car comes without brakes and with its rear axle driven; a car must be driven."""
+    take_car_without_brakes(visitor)
     visitor.click("#tab-car")
     visitor.page.get_by_role("button", name="Add brakes").click()
     visitor.until("ridetune.state('vehicle').brakes?.front_share === 0.65")
@@ -301,7 +302,7 @@ def test_an_impossible_car_is_refused_in_words(visitor):
     field.press("Enter")
     visitor.wait(lambda: visitor.element(".notice.error").is_visible(), "the refusal is shown")
     assert "chassis mass is -3, but must lie" in visitor.element(".notice.error").inner_text()
-    assert field.input_value() == "1048.5"
+    assert field.input_value() == "1053.16"
 
 
 def test_the_page_waits_while_the_service_compiles(visit, service):

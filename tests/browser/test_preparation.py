@@ -1,11 +1,13 @@
 """How recordings drive the model, chosen on the page."""
 
+import json
 from math import radians
 
 import numpy as np
 import pytest
+from ridetune.engine.manoeuvre import manoeuvre_to_json, reference_manoeuvres
 
-from .conftest import Visitor, add_file
+from .conftest import Visitor, add_file, take_car_without_brakes
 from .test_identification import free_only
 
 pytestmark = pytest.mark.browser
@@ -42,7 +44,8 @@ def test_filters_and_initial_state_act_on_the_ride_and_on_the_fit(visitor):
 
 
 def test_braking_is_marked_run_by_run(visitor):
-    """The sample car has no brakes, which a mark that asks for them is told."""
+    """A car has no brakes, which a mark that asks for them is told."""
+    take_car_without_brakes(visitor)
     visitor.expect("status of 422")
     visitor.click("#tab-identification")
     when = "When detailed_manoeuvre_1.csv brakes"
@@ -65,10 +68,10 @@ def test_noise_is_typed_or_stated_or_the_default(visitor):
     noise = {name: visitor.page.get_by_label(f"Noise of {name}") for name in ("z", "pitch", "roll")}
     summary = visitor.page.locator("summary", has_text="Noise")
     visitor.click("#tab-identification")
-    assert summary.inner_text() == "Noise: default"
+    assert summary.inner_text() == "Noise: stated"
     summary.click()
     shown = {name: field.get_attribute("placeholder") for name, field in noise.items()}
-    assert shown == {"z": "0.5", "pitch": "0.02", "roll": "0.02"}
+    assert shown == {"z": "0.1", "pitch": "0.005", "roll": "0.005"}
 
     visitor.click("#tab-measurements")
     add_file(visitor, "detailed_manoeuvre_1.toml", b"noise.chassis.z = 0.002")
@@ -93,6 +96,20 @@ def test_noise_is_typed_or_stated_or_the_default(visitor):
     assert sent.value.post_data_json["noise"] == {"chassis.roll": pytest.approx(radians(0.1))}
 
 
+def test_what_was_driven_is_told_by_the_file_beside_a_recording(visitor):
+    visitor.click("#tab-measurements")
+    detail = visitor.element(".measurement-detail")
+    assert "Driven: Manoeuvre 1" in detail.inner_text()
+    detail.get_by_role("button", name="Forget").click()
+    visitor.wait(lambda: "What was driven is not known" in detail.inner_text(), "it is forgotten")
+    bump = json.dumps(manoeuvre_to_json(reference_manoeuvres()["bump"])).encode()
+    add_file(visitor, "detailed_manoeuvre_2.manoeuvre.json", bump)
+    name = reference_manoeuvres()["bump"].name
+    visitor.wait(lambda: f"Driven: {name}." in detail.inner_text(), "the file is taken")
+    kept = visitor.look("ridetune.state('measurements').map(({ manoeuvre }) => manoeuvre?.name)")
+    assert kept == [None, name]
+
+
 def test_notes_without_their_recording_are_explained(visitor):
     visitor.expect("status of 422")
     visitor.click("#tab-measurements")
@@ -100,6 +117,8 @@ def test_notes_without_their_recording_are_explained(visitor):
     for name, data, said in (
         ("lap.toml", b"noise.chassis.z = 0.002", "No recording here is called lap.csv"),
         ("detailed_manoeuvre_2.toml", b"", "states no noise of chassis.z"),
+        ("lap.manoeuvre.json", b"{}", "No recording here is called lap.csv, whose manoeuvre"),
+        ("detailed_manoeuvre_2.manoeuvre.json", b"{}", "name is missing"),
     ):
         add_file(visitor, name, data)
         visitor.wait(lambda: problem.is_visible() and name in problem.inner_text(), "it is refused")

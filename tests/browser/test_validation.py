@@ -17,10 +17,15 @@ def file(tmp_path_factory):
     """A report by the command line, of a recording whose name is markup."""
     folder = tmp_path_factory.mktemp("report")
     name = "<img src=x onerror=alert(1)>.csv"
-    (folder / name).write_bytes((SAMPLES / "paper_twin_1.csv").read_bytes())
+    (folder / name).write_bytes((SAMPLES / "twin/manoeuvre_1.csv").read_bytes())
     command = ["validate", str(folder / name), "--vehicle", "paper", "--free", "K_F"]
-    command += ["--hold-out", str(SAMPLES / "paper_twin_2.csv"), "-o", str(folder / "report.html")]
-    command += ["--manoeuvre", "paper_twin_2.csv=2"]
+    command += [
+        "--hold-out",
+        str(SAMPLES / "twin/manoeuvre_2.csv"),
+        "-o",
+        str(folder / "report.html"),
+    ]
+    command += ["--manoeuvre", "manoeuvre_2.csv=2"]
     assert main(command) == 0
     return folder / "report.html"
 

@@ -73,7 +73,7 @@ def test_units_become_si():
 
 def test_the_shipped_recordings_are_read_without_a_warning():
     folder = Path(ridetune.sample_runs.__path__[0])
-    run = read_run(folder / "detailed_manoeuvre_2.csv")
+    run = read_run(folder / "detailed/manoeuvre_2.csv")
     assert (run.time.size, run.duration, run.warnings) == (4001, 20.0, ())
     assert run.sample_step == pytest.approx(0.005)
     assert np.max(np.abs(run["chassis.z"])) < 0.05
@@ -297,7 +297,7 @@ def test_a_doubtful_magnitude_is_questioned(title, peak, warning):
 
 @pytest.mark.parametrize(
     ("run", "channel"),
-    [("detailed_manoeuvre_1", "chassis.pitch"), ("paper_twin_2", "chassis.roll")],
+    [("detailed/manoeuvre_1", "chassis.pitch"), ("twin/manoeuvre_2", "chassis.roll")],
 )
 def test_a_motion_that_peaks_beyond_its_unit_is_no_spike(run, channel):
     """Degrees under a header that says rad: the peaks alone are beyond what a car does."""

@@ -29,7 +29,7 @@ PAPER = reference_vehicles()["paper"]
 
 
 def twin(number, role="fit", known=True):
-    run = read_run(FOLDER / f"paper_twin_{number}.csv")
+    run = read_run(FOLDER / f"twin/manoeuvre_{number}.csv")
     return Case(run, role, reference_manoeuvres()[str(number)] if known else None)
 
 
