@@ -21,6 +21,7 @@ from scipy.stats import qmc
 
 from .errors import SweepError
 from .parameters import number_path
+from .units import after_number
 from .vehicle import numbers
 
 Array = NDArray[np.float64]
@@ -237,7 +238,7 @@ def _check_range(name: str, low: float, high: float, what: str) -> None:
     for value in (low, high):
         _check_value(name, value, what)
     accepted = numbers()[name]
-    unit = "" if accepted.unit == "1" else f" {accepted.unit}"
+    unit = after_number(accepted.unit)
     if low >= high:
         raise SweepError(
             f"The {what} of {name}, {low:g} to {high:g}{unit}, are crossed or leave no room; give"

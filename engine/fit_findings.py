@@ -15,6 +15,7 @@ from .problem import ComparedRun
 from .simulation import fit_percent
 from .spikes import despiked
 from .uncertainty import Uncertainty
+from .units import after_number
 
 Array = NDArray[np.float64]
 Histories = Mapping[str, Mapping[str, Array]]
@@ -209,15 +210,13 @@ def undetermined_findings(estimates: Sequence[ParameterEstimate], errors: Uncert
 def _at_bound(one: ParameterEstimate) -> str:
     at_lower = one.value - one.lower < one.upper - one.value
     side, bound = ("lower", one.lower) if at_lower else ("upper", one.upper)
+    said = f"{one.name} is at its {side} bound, {bound:.4g}{after_number(one.unit)}"
     if one.name.endswith("knee_speed") and not at_lower:
         return (
-            f"{one.name} is at its upper bound, {bound:.4g} {one.unit}: the runs show no knee, as"
+            f"{said}: the runs show no knee, as"
             " if the damper kept its slopes at every speed; fix it or add a rougher run."
         )
-    return (
-        f"{one.name} is at its {side} bound, {bound:.4g} {one.unit}; widen the bound or fix the "
-        "parameter."
-    )
+    return f"{said}; widen the bound or fix the parameter."
 
 
 def _excited(one: ParameterEstimate, errors: Uncertainty, k: int) -> bool:

@@ -38,7 +38,10 @@ PER_DEGREE = math.pi / 180.0
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One parameter; slider limits, step and `unit` are SI, `display = SI * display_factor`."""
+    """One parameter; slider limits, step and `unit` are SI, `display = SI * display_factor`.
+
+    meaning : what the label leaves open
+    """
 
     name: str
     symbol: str
@@ -49,6 +52,7 @@ class Parameter:
     slider_lower: float
     slider_upper: float
     step: float
+    meaning: str = ""
 
 
 def _spring(axle: AxleName) -> Parameter:
@@ -146,6 +150,7 @@ def _rebound_ratio(axle: AxleName) -> Parameter:
         slider_lower=0.2,
         slider_upper=5.0,
         step=0.05,
+        meaning="the damper's slope in rebound over that in jounce, near rest",
     )
 
 
@@ -160,6 +165,7 @@ def _knee_speed(axle: AxleName) -> Parameter:
         slider_lower=0.02,
         slider_upper=5.0,
         step=0.01,
+        meaning="where the damper's force is half of what its slope near rest promises",
     )
 
 

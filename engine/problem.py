@@ -22,6 +22,7 @@ from .rims import RimsInputs, filtered_outputs, prepare
 from .rims_settings import RimsSettings
 from .run_notes import DEFAULT_NOISE
 from .simulation import Traction
+from .units import after_number
 from .vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -207,7 +208,7 @@ def _free_parameter(
     vehicle: Vehicle, name: str, limits: tuple[float, float] | None
 ) -> FreeParameter:
     start = vehicle.value(name)
-    unit = parameter(name).unit
+    unit = after_number(parameter(name).unit)
     if limits is not None:
         lower, upper = (float(limit) for limit in limits)
     else:
@@ -216,17 +217,17 @@ def _free_parameter(
         raise ProblemError(f"The bounds of {name}, {lower} to {upper}, must be finite numbers.")
     if lower >= upper:
         raise ProblemError(
-            f"The bounds of {name}, {lower:g} to {upper:g} {unit}, are crossed or leave no room; "
+            f"The bounds of {name}, {lower:g} to {upper:g}{unit}, are crossed or leave no room; "
             "give the lower one first, or fix the parameter."
         )
     if not lower <= start <= upper:
         raise ProblemError(
-            f"{name} starts at {start:g} {unit}, outside its bounds {lower:g} to {upper:g} {unit}; "
+            f"{name} starts at {start:g}{unit}, outside its bounds {lower:g} to {upper:g}{unit}; "
             "move the start or the bounds."
         )
     if name.endswith("pivot.distance") and lower < 0.0 < upper:
         raise ProblemError(
-            f"The bounds of {name}, {lower:g} to {upper:g} {unit}, span zero, where the pivot "
+            f"The bounds of {name}, {lower:g} to {upper:g}{unit}, span zero, where the pivot "
             "would be at the wheel; keep both on the side of the start value."
         )
     try:

@@ -29,6 +29,11 @@ class UnitError(RideError):
     code = "unit"
 
 
+def after_number(unit: str) -> str:
+    """A unit as it stands behind a number in a sentence; nothing for that of a plain number."""
+    return "" if unit == "1" else f" {unit}"
+
+
 _PLAIN_NUMBER = {"", "-", "1"}
 
 _ALIASES = {

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from .errors import ParameterError, VehicleError
 from .frames import AXLES, CORNERS, AxleName, Corner, axle_of
+from .units import after_number
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +40,7 @@ class Range:
 
     def __str__(self) -> str:
         """Say the range as a person reads it."""
-        unit = "" if self.unit == "1" else f" {self.unit}"
+        unit = after_number(self.unit)
         if self.apart:
             return (
                 f"between {self.apart:g} and {self.upper:g}{unit}"
@@ -343,7 +344,7 @@ def all_hold(conditions: Iterable[Any]) -> Any:
 def _conditions(vehicle: Vehicle) -> Iterator[Condition]:
     """What `check` asks for, in its order."""
     for path, value, accepted in _ranged(vehicle):
-        unit = "" if accepted.unit == "1" else f" {accepted.unit}"
+        unit = after_number(accepted.unit)
         yield (
             accepted.holds(value),
             lambda: f"{path} is {value:g}{unit}, but must lie {accepted}; correct it.",

@@ -157,7 +157,7 @@ function row(parameter, side) {
   };
   const slider = h("input", {
     type: "range", id: `slider-${id}`, min: lower, max: upper, step: "any",
-    "aria-label": `${parameter.label}, ${unit}`,
+    "aria-label": units.withUnit(parameter.label, unit, ", "),
     on: {
       input: () => {
         const raw = Number(slider.value);
@@ -191,7 +191,7 @@ function row(parameter, side) {
   };
   rows.set(name, parts);
   parts.element = h("div", { className: "parameter", dataset: { name } },
-    h("label", { htmlFor: field.id, title: parameter.label }, symbol(parameter.symbol), " ", label),
+    h("label", { htmlFor: field.id, title: titleOf(parameter) }, symbol(parameter.symbol), " ", label),
     field, h("span", { className: "unit" }, unit),
     h("div", { className: "track" }, parts.interval, slider, parts.baseline),
     h("div", { className: "after" }, parts.spread, parts.reset));
@@ -202,13 +202,14 @@ function row(parameter, side) {
 function refuse({ name, label, display_factor: factor, display_unit: unit }, before, why) {
   set({ values: { ...get("values"), [name]: before } });
   rows.get(name).field.value = units.short(before * factor);
-  notice("warning", `${label} stays ${units.plain(before * factor)} ${unit}`, why);
+  notice("warning", `${label} stays ${units.withUnit(units.plain(before * factor), unit)}`, why);
 }
 
 /** Why a number that no car can have is not taken; what is no number at all has no text. */
 function unaccepted({ lower, upper, apart, display_factor: factor, display_unit: unit }, text) {
-  const range = (from, to) => `${units.plain(from * factor)} to ${units.plain(to * factor)} ${unit}`;
-  const said = text ? `${text} ${unit} is not accepted` : "What was typed is no number";
+  const range = (from, to) =>
+    units.withUnit(`${units.plain(from * factor)} to ${units.plain(to * factor)}`, unit);
+  const said = text ? `${units.withUnit(text, unit)} is not accepted` : "What was typed is no number";
   return apart ? `${said}; give ${range(apart, upper)} or ${range(lower, -apart)}.`
     : `${said}; give ${range(lower, upper)}.`;
 }
@@ -233,10 +234,13 @@ function tellBeyond(parameter) {
   const value = get("values")[name];
   if (value >= from && value <= to) return;
   const [shown, lower, upper] = [value, from, to].map((x) => units.plain(x * factor));
-  notice("warning", `${label} is now ${shown} ${unit}`,
-    `That is beyond its slider, ${lower} to ${upper} ${unit}; the arrow beside it brings the ` +
-    "baseline back.");
+  notice("warning", `${label} is now ${units.withUnit(shown, unit)}`,
+    `That is beyond its slider, ${units.withUnit(`${lower} to ${upper}`, unit)}; the arrow beside it ` +
+    "brings the baseline back.");
 }
+
+/** The whole label, and what it leaves open. */
+export const titleOf = ({ label, meaning }) => (meaning ? `${label}: ${meaning}` : label);
 
 /** "Front stabilizer bar stiffness" under "Front axle" is "Bar stiffness"; the title says it all. */
 function plainLabel(parameter, side) {
@@ -272,17 +276,18 @@ function show() {
       return `calc(${THUMB / 2}px + ${share} * (100% - ${THUMB}px))`;
     };
     slider.value = shown;
-    slider.setAttribute("aria-valuetext", `${units.number(shown)} ${parameter.display_unit}`);
+    const said = (text) => units.withUnit(text, parameter.display_unit);
+    slider.setAttribute("aria-valuetext", said(units.number(shown)));
     if (document.activeElement !== field) field.value = units.short(shown);
     const outside = shown < lower || shown > upper;
     field.title = outside
-      ? `Beyond the slider, which goes from ${units.number(lower)} to ${units.number(upper)} ` +
-        parameter.display_unit : "";
+      ? said(`Beyond the slider, which goes from ${units.number(lower)} to ${units.number(upper)}`)
+      : "";
     const moved = Math.abs(shown - start) > 1e-9 * Math.max(1, Math.abs(start));
     changed += moved;
     parts.element.classList.toggle("moved", moved);
     parts.element.classList.toggle("outside", outside);
-    parts.reset.title = `Back to the baseline, ${units.number(start)} ${parameter.display_unit}`;
+    parts.reset.title = said(`Back to the baseline, ${units.number(start)}`);
     parts.reset.disabled = !moved;
     parts.baseline.style.left = at(start);
     parts.baseline.hidden = compared === undefined;
@@ -315,6 +320,6 @@ function band(parts, estimate, factor, at, shown) {
     : half > Math.abs(value) ? "± >100 %" : `± ${units.number(half, 2)}`;
   spread.className = `spread ${estimate.determined}`;
   spread.title =
-    `Identified ${units.number(value)} ${parameter.display_unit}, 95 % interval ` +
+    `Identified ${units.withUnit(units.number(value), parameter.display_unit)}, 95 % interval ` +
     `${units.number(low)} to ${units.number(high)}; ${DETERMINED[estimate.determined]}`;
 }

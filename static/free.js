@@ -1,7 +1,7 @@
 // Which parameters an identification is free to move, from where and between which bounds.
 
 import * as api from "./api.js";
-import { bend, bent, holds } from "./controls.js";
+import { bend, bent, holds, titleOf } from "./controls.js";
 import { h, symbol } from "./dom.js";
 import { get, on, set } from "./store.js";
 import * as units from "./units.js";
@@ -103,7 +103,7 @@ function freeRow(parameter) {
   });
   const fields = ["Lower", "Upper"].map((word, side) => {
     const field = h("input", {
-      type: "number", step: "any", "aria-label": `${word} bound of ${parameter.label}, ${unit}`,
+      type: "number", step: "any", "aria-label": units.withUnit(`${word} bound of ${parameter.label}`, unit, ", "),
       on: { change: () => {
         typed[name] ??= [null, null];
         typed[name][side] = field.value === "" ? null : Number(field.value) / factor;
@@ -116,7 +116,7 @@ function freeRow(parameter) {
   const begins = h("td");
   const row = h("tr", {},
     h("td", {}, free),
-    h("th", { scope: "row", title: parameter.label }, symbol(parameter.symbol), " ",
+    h("th", { scope: "row", title: titleOf(parameter) }, symbol(parameter.symbol), " ",
       h("span", { className: "soft long" }, parameter.label)),
     begins, fields.map((field) => h("td", {}, field)),
     h("td", { className: "unit" }, unit));
@@ -132,7 +132,7 @@ function freeRow(parameter) {
       field.classList.toggle("own", own);
       field.classList.toggle("held", Boolean(held) && !own);
       field.title = own
-        ? `Typed; empty the field for ${units.number(usual[side] * factor)} ${unit}`
+        ? units.withUnit(`Typed; empty the field for ${units.number(usual[side] * factor)}`, unit)
         : held ? "From the applied fit, which ended at a bound; type another to search further"
           : `Default, ${parameter.bounds_rule}; type a bound to hold it`;
     });

@@ -126,7 +126,7 @@ function estimateRow(estimate) {
   const interval = estimate.confidence_interval;
   const bounds = `${shown(estimate.lower, 3)} … ${shown(estimate.upper, 3)}`;
   const upper = estimate.upper - estimate.value < estimate.value - estimate.lower;
-  const searched = `Searched between ${bounds} ${row.display_unit}, from ${shown(estimate.start)}`;
+  const searched = `Searched between ${units.withUnit(bounds, row.display_unit)}, from ${shown(estimate.start)}`;
   return h("tr", { title: searched },
     h("th", { scope: "row", title: `${row.label}. ${searched}` }, symbol(row.symbol), " ",
       h("span", { className: "soft long" }, row.label)),

@@ -30,6 +30,9 @@ function atPoint(name, unit) {
   return { name, label, unit, display_unit: point ? "m/s²" : unit, display_factor: 1 };
 }
 
+/** A number's text with its unit, which a ratio has none of. */
+export const withUnit = (text, unit, between = " ") => (unit ? `${text}${between}${unit}` : text);
+
 export const parameter = (name) => parameters.get(name);
 
 /** A number for reading: `digits` significant, no exponent for sizes a person meets. */

@@ -328,3 +328,15 @@ def test_two_slope_dampers_are_switched_on_and_off(visitor):
     assert rows.count() == 12
     assert not visitor.element("#value-rear-suspension-knee_speed").is_visible()
     np.testing.assert_allclose(visitor.line("chassis.z"), before, atol=1e-9)
+
+
+def test_a_ratio_is_told_without_a_unit(visitor):
+    visitor.click("#tab-identification")
+    visitor.click("#two-slope")
+    ratio = visitor.element("#value-front-suspension-rebound_ratio")
+    label = visitor.page.get_by_text("Rebound ratio").first
+    assert "rebound over that in jounce" in label.get_attribute("title")
+    ratio.fill("25")
+    ratio.press("Tab")
+    said = visitor.element("#notices").inner_text()
+    assert "Front rebound ratio stays 1.5. 25 is not accepted; give 0.05 to 20." in said

@@ -102,6 +102,7 @@ def test_two_recordings_of_one_name_are_told_apart():
         ({"bounds": {SPRING: (3e4, 1e4)}}, "crossed"),
         ({"bounds": {SPRING: (2e4, 2e4)}}, "leave no room"),
         ({"bounds": {SPRING: (3e4, 4e4)}}, "outside its bounds"),
+        ({"free": ["rho_F"], "start": {"rho_F": 12}}, "12, outside its bounds 0.2 to 10; move"),
         ({"bounds": {SPRING: (1e4, math.inf)}}, "finite"),
         ({"bounds": {SPRING: (1.0, 1e5)}}, "A bound of front.suspension.stiffness"),
         ({"bounds": {PIVOT: (-2.0, 2.0)}}, "span zero"),
