@@ -3,6 +3,7 @@
 import * as api from "./api.js";
 import { valueAt, valuesOf, withValues } from "./controls.js";
 import { $, fileName, h, saveFile } from "./dom.js";
+import { holdDampers } from "./free.js";
 import { notice, refused } from "./notices.js";
 import { get, on, set } from "./store.js";
 import * as units from "./units.js";
@@ -31,6 +32,7 @@ async function take(vehicle, what) {
   try {
     const saved = (await api.saveVehicle(vehicle)) ?? vehicle;
     await api.saveBaseline(saved);
+    holdDampers();
     set({ vehicle: saved, baseline: saved, values: valuesOf(saved), fit: null });
     notice("info", what, `Sliders and baseline now hold “${saved.name}”.`);
   } catch (error) {

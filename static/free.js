@@ -1,7 +1,7 @@
 // Which parameters an identification is free to move, from where and between which bounds.
 
 import * as api from "./api.js";
-import { bend, bent, holds, titleOf } from "./controls.js";
+import { bend, bent, holds, ofBentDamper, titleOf } from "./controls.js";
 import { h, symbol } from "./dom.js";
 import { get, on, set } from "./store.js";
 import * as units from "./units.js";
@@ -17,6 +17,7 @@ let body = null;
 
 /** Keep the table's numbers in step with sliders and default bounds. */
 export function build() {
+  holdDampers();
   on("values defaultBounds fit", () => { if (note) show(); });
 }
 
@@ -38,13 +39,25 @@ function fill() {
 
 const shown = () => get("parameters").filter(({ name }) => name in get("values"));
 
+const damperNames = () => get("parameters").filter(ofBentDamper).map(({ name }) => name);
+
+/** The dampers that a car brings along are known, as its masses are, until they are freed here. */
+export function holdDampers() {
+  damperNames().forEach((name) => fixed.add(name));
+}
+
 function dampers() {
   const box = h("input", {
-    type: "checkbox", id: "two-slope", checked: bent(), on: { change: () => bend(box.checked) },
+    type: "checkbox", id: "two-slope", checked: bent(), on: { change: () => {
+      if (box.checked) damperNames().forEach((name) => fixed.delete(name));
+      else holdDampers();
+      bend(box.checked);
+    } },
   });
   return h("label", {
-    className: "inline", title: "Another slope in rebound than in jounce, and a speed from which the " +
-      "force grows less: four more parameters",
+    className: "inline", title: "Another slope in rebound than in jounce, and a speed at which the " +
+      "force has fallen to half: four more parameters to find. Those of a car that has such dampers " +
+      "are known until they are freed.",
   }, box, " Two-slope dampers");
 }
 
@@ -94,7 +107,7 @@ export function askBounds() {
 function freeRow(parameter) {
   const { name, display_factor: factor, display_unit: unit } = parameter;
   const free = h("input", {
-    type: "checkbox", checked: !fixed.has(name), "aria-label": `${parameter.label} is free`,
+    type: "checkbox", "aria-label": `${parameter.label} is free`,
     on: { change: () => {
       if (free.checked) fixed.delete(name);
       else fixed.add(name);
@@ -125,6 +138,7 @@ function freeRow(parameter) {
     const both = boundsOf(name);
     const held = heldBounds(name);
     const usual = usualBounds(name);
+    free.checked = !fixed.has(name);
     fields.forEach((field, side) => {
       const own = (typed[name]?.[side] ?? null) !== null;
       if (!typing || field !== document.activeElement) field.value = units.short(both[side] * factor);

@@ -17,6 +17,7 @@ from numpy.testing import assert_allclose
 from ridetune.app.cli import main
 from ridetune.engine.channels import Run
 from ridetune.engine.measurement import read_run, write_run
+from ridetune.engine.parameters import PARAMETER_NAMES
 from ridetune.engine.sensors import RECORDED as SENSED
 from ridetune.engine.vehicle_file import read_vehicle, reference_vehicles, write_vehicle
 
@@ -316,6 +317,16 @@ def test_two_slope_dampers_are_found_beside_what_else_is_free(folder, driven):
         "rear.suspension.rebound_ratio",
     ]
     assert "rebound_ratio" in fit["vehicle"]["rear"]["suspension"]
+
+
+def test_two_slope_dampers_of_the_car_are_known_unless_asked_for(folder, driven):
+    knees = {f"{axle}.suspension.knee_speed": 0.4 for axle in ("front", "rear")}
+    write_vehicle(reference_vehicles()["paper"].with_values(knees), "bent.json")
+    command = ["identify", str(driven), "--vehicle", "bent.json", "-o", "fit.json"]
+    assert main(command) == 0
+    fit = json.loads((folder / "fit.json").read_text())
+    assert [one["name"] for one in fit["parameters"]] == list(PARAMETER_NAMES)
+    assert fit["vehicle"]["rear"]["suspension"]["knee_speed"] == 0.4
 
 
 def test_a_path_names_the_run_where_the_file_s_name_names_two(folder, driven, capsys):

@@ -1,8 +1,13 @@
 """From a measured ride to an identified car, on the page."""
 
+import json
+
 import numpy as np
 import pytest
+from ridetune.engine.parameters import ALL_NAMES, PARAMETER_NAMES
+from ridetune.engine.vehicle_file import vehicle_to_json
 
+from ..factories import paper_vehicle
 from .conftest import SAMPLES, add_file, short_run
 
 pytestmark = pytest.mark.browser
@@ -328,6 +333,50 @@ def test_two_slope_dampers_are_switched_on_and_off(visitor):
     assert rows.count() == 12
     assert not visitor.element("#value-rear-suspension-knee_speed").is_visible()
     np.testing.assert_allclose(visitor.line("chassis.z"), before, atol=1e-9)
+
+
+def test_dampers_that_a_car_brings_along_are_known_until_they_are_freed(visitor):
+    """Oracle: what an identification is asked to free, as of REST and the command line."""
+    car = vehicle_to_json(paper_vehicle())
+    for axle in ("front", "rear"):
+        car[axle]["suspension"] |= {"rebound_ratio": 2.0, "knee_speed": 0.4}
+
+    def bring():
+        visitor.click("#tab-car")
+        visitor.page.get_by_label("Vehicle file").set_input_files(
+            [
+                {
+                    "name": "bent.json",
+                    "mimeType": "application/json",
+                    "buffer": json.dumps(car).encode(),
+                }
+            ]
+        )
+        visitor.until("ridetune.state('baseline').front.suspension.knee_speed === 0.4")
+        visitor.settled()
+        visitor.click("#tab-identification")
+
+    def freed():
+        visitor.click("#start")
+        visitor.until("ridetune.job() && ['queued', 'running'].includes(ridetune.job().state)")
+        names = set(visitor.look("ridetune.job().free"))
+        visitor.click("#cancel")
+        visitor.until("ridetune.job().state === 'cancelled'")
+        visitor.click("#identification >> text=Set-up")
+        return names
+
+    bring()
+    rows = visitor.element(".free tbody tr")
+    assert rows.count() == 16
+    assert visitor.element("#two-slope").is_checked()
+    assert freed() == set(PARAMETER_NAMES)
+    visitor.page.get_by_label("Front rebound ratio is free").check()
+    assert freed() == {*PARAMETER_NAMES, "front.suspension.rebound_ratio"}
+    visitor.click("#two-slope")
+    visitor.click("#two-slope")
+    assert freed() == set(ALL_NAMES)
+    bring()
+    assert freed() == set(PARAMETER_NAMES)
 
 
 def test_a_ratio_is_told_without_a_unit(visitor):
