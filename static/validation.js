@@ -4,10 +4,12 @@ import * as api from "./api.js";
 import { $, h, inPlace } from "./dom.js";
 import { nameOf } from "./names.js";
 import { refused } from "./notices.js";
+import * as pivots from "./pivots.js";
 import { brakingOf } from "./preparation.js";
 import { unseen } from "./setup.js";
 import { get, on, set } from "./store.js";
 import { sections } from "./validation_view.js";
+import { worded } from "./wording.js";
 
 /** The choice of what is kept with the recording. */
 const KEPT = "kept";
@@ -49,7 +51,7 @@ function runs() {
 }
 
 async function start() {
-  if (starting || busy()) return;
+  if (starting || busy() || !pivots.ready()) return;
   starting = true;
   const { seen, others } = runs();
   const held = others.filter(({ id }) => !left.has(id)).map(({ id }) => id);
@@ -60,6 +62,7 @@ async function start() {
       hold_out: held,
       manoeuvres: Object.fromEntries(chosen.filter((id) => id in told).map((id) => [id, told[id]])),
       braking: brakingOf(held),
+      geometry: pivots.geometry(),
     });
     found = null;
     watch(job.id);
@@ -115,6 +118,7 @@ function content() {
   return [
     h("ul", { className: "runs" }, seen.map((run) => runRow(run, h("span", { className: "soft" }, "fitted"))),
       others.map((run) => runRow(run, held(run)))),
+    pivots.view(),
     h("div", { className: "row-tools" },
       busy() ? h("button", { type: "button", id: "cancel-validation", className: "danger", on: { click: cancel } },
         "Cancel")
@@ -122,7 +126,7 @@ function content() {
       found ? h("a", { className: "button", id: "report", target: "_blank", rel: "noopener",
         href: api.reportUrl(job.id) }, "Open report") : null,
       h("span", { className: "hint", id: "validation-state" }, state())),
-    job?.error ? h("div", { className: "problem", role: "alert" }, h("p", {}, job.error.detail)) : null,
+    job?.error ? h("div", { className: "problem", role: "alert" }, h("p", {}, worded(job.error.detail))) : null,
     ...(found ? sections(found) : []),
   ];
 }

@@ -1,5 +1,6 @@
 """The validation on the page and its report: from a file, from the service, and on paper."""
 
+import math
 import re
 
 import pytest
@@ -43,6 +44,10 @@ def pages(pdf):
     return len(re.findall(rb"/Type\s*/Page\b", pdf))
 
 
+def give_pivot(visitor, label, text):
+    visitor.page.get_by_label(f"{label} by geometry").fill(text)
+
+
 def test_a_report_opens_from_a_file_and_prints(visit, file):
     """6 figures of a run on rims alone; 4 more, road and three outputs, where the road is known."""
     page = visit().page
@@ -70,11 +75,26 @@ def test_the_fitted_car_is_validated_on_the_page(visitor):
     visitor.click("#identify")
     visitor.until("ridetune.state('fitJob') !== null", PRESSED)
     visitor.click("#tab-validation")
+    give_pivot(visitor, "Rear pivot distance", "1.1")
+    visitor.click("#validate")
+    missing = visitor.page.get_by_label("Rear pivot angle by geometry")
+    said = missing.evaluate("(field) => field.validationMessage")
+    assert said == "Give distance and angle of the rear pivot, or neither."
+    assert visitor.look("ridetune.validation()") is None
+    give_pivot(visitor, "Rear pivot angle", "10")
     visitor.click("#validate")
     visitor.until("ridetune.validation() && ridetune.validation().state === 'done'", PRESSED)
+    geometry = visitor.look("ridetune.validation().geometry")
+    assert geometry == {"rear": {"distance": 1.1, "angle": pytest.approx(math.radians(10))}}
     visitor.wait(lambda: visitor.element("#report").count() == 1, "a link to the report")
     visitor.page.wait_for_timeout(300)
     assert visitor.element("#validation .figure").count() >= 12
+    estimates = visitor.element("#validation .validation-estimates")
+    assert "By geometry" in estimates.locator("thead").inner_text()
+    assert (
+        estimates.locator("tr", has_text="Rear pivot angle").locator("td").nth(3).inner_text()
+        == "10.00"
+    )
     assert visitor.element("#validation .validation-scores tbody").count() == 2
     with visitor.page.context.expect_page() as opened:
         visitor.click("#report")
