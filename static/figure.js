@@ -3,7 +3,7 @@
 import { h } from "./dom.js";
 import { AXIS, decadeLabels, decades, fitWidth, room } from "./plots.js";
 
-const HEIGHT = 128;
+const HEIGHT = 140;
 const LOG_HEIGHT = 240;
 
 /**
@@ -21,9 +21,9 @@ export function figure({ title, unit, xLabel, x, lines, log = false, range = nul
     scales: log ? { x: { time: false, distr: 3, range: range.x }, y: { distr: 3, range: range.y } }
       : { x: { time: false }, y: { range: room } },
     axes: [
-      { ...AXIS, size: 32, gap: 2, label: xLabel, labelFont: AXIS.font, labelSize: 13, labelGap: 0,
+      { ...AXIS, size: 22, gap: 2, label: xLabel, labelFont: AXIS.font, labelSize: 14, labelGap: 0,
         ...(log ? decadeAxis((splits) => splits) : {}) },
-      { ...AXIS, size: 50, gap: 4, ...(log ? decadeAxis(decadeLabels) : {}) },
+      { ...AXIS, size: 50, gap: 4, space: 22, ...(log ? decadeAxis(decadeLabels) : {}) },
     ],
     series: [{}, ...lines.map(({ label, stroke, width: thick, dash }) => ({
       label, stroke, width: thick ?? 1.2, dash: dash ?? [], points: { show: false }, spanGaps: true,

@@ -21,6 +21,12 @@ const WHEELS = {
   rl: { stroke: "#009e73", dash: [5, 3] }, rr: { stroke: "#cc79a7", dash: [5, 3] },
 };
 const ROAD_COLOURS = ["#0072b2", "#d55e00"];
+/** How recordings were prepared, as the set-up of an identification calls it. */
+const SETTINGS = {
+  a_x_cutoff_hz: "Low-pass of aₓ, Hz", rim_cutoff_hz: "Low-pass of wheels, Hz",
+  output_cutoff_hz: "Low-pass of z, pitch, roll, Hz", initial_state: "Initial state",
+  step: "Longest step, s",
+};
 const WELL = { yes: "well", weakly: "weakly", no: "not" };
 
 /** Sections of a validation's document; `width` of the figures in px, null to follow their box. */
@@ -84,7 +90,8 @@ function scoreRow(one) {
 function squats({ runs }) {
   const squatting = runs.filter(({ squat }) => squat);
   if (!squatting.length) return null;
-  const degrees = (value) => (value === null ? "–" : shown("chassis.pitch", value, 3));
+  const degrees = (value) =>
+    (value === null ? "–" : units.fixed(value * units.channel("chassis.pitch").display_factor, 3));
   const kinds = [["rims", "8dof"], ["rims", "7dof"], ["road", "8dof"], ["road", "7dof"]]
     .filter(([mode, model]) => squatting.some((run) => find(run, mode, model)));
   return [
@@ -109,15 +116,17 @@ function estimates({ fit, geometry }) {
   const measured = Object.keys(geometry).length > 0;
   const head = ["Parameter", "Value", "± (95 %)", "Unit", ...(measured ? ["By geometry"] : []),
     "Searched between", "Determined"];
-  return h("div", { className: "wide-table" }, h("table", { className: "validation-estimates" },
-    h("thead", {}, h("tr", {}, head.map((text) => h("th", { scope: "col" }, text)))),
+  return h("div", { className: "wide-table" }, h("table", { className: `validation-estimates${measured ? " with-geometry" : ""}` },
+    h("thead", {}, h("tr", {}, head.map((text) =>
+      h("th", { scope: "col", className: text === "Unit" ? "unit" : "" }, text)))),
     h("tbody", {}, fit.parameters.map((one) => {
       const row = units.parameter(one.name);
       const number = (value, digits) => units.number(value === null ? NaN : value * row.display_factor, digits);
       const [lower, upper] = one.confidence_interval;
       const half = lower === null || upper === null ? null : (upper - lower) / 2;
       return h("tr", {},
-        h("th", { scope: "row" }, symbol(row.symbol), ` ${row.label}`),
+        h("th", { scope: "row", title: row.label }, symbol(row.symbol), " ",
+          h("span", { className: "long" }, row.label)),
         h("td", { className: "strong" }, number(one.value)),
         h("td", {}, half === null ? "unknown" : number(half, 2)),
         h("td", { className: "unit" }, row.display_unit),
@@ -154,14 +163,14 @@ function figures(run, document, width) {
   add({ title: "Rim centres, vertical", unit: units.channel("wheel.fl.z").display_unit,
     lines: CORNERS.map((corner) => ({ label: corner, width: 1,
       y: display(`wheel.${corner}.z`, measured[`wheel.${corner}.z`]), ...WHEELS[corner] })) });
-  for (const mode of Object.keys(MODES)) {
-    const driven = predictions.filter((one) => one.mode === mode);
-    if (!driven.length) continue;
-    for (const name of OUTPUTS.filter((output) => measured[output])) {
+  for (const name of OUTPUTS.filter((output) => measured[output])) {
+    for (const mode of Object.keys(MODES)) {
+      const driven = predictions.filter((one) => one.mode === mode);
+      if (!driven.length) continue;
       add(channelFigure(name, [measuredLine(name, measured),
         ...[...driven].reverse().filter(({ values }) => values[name]).map((one) => ({
           label: `${MODELS[one.model]}, ${percent(one.scores[name])}`, y: display(name, one.values[name]),
-          ...LOOK[one.model] }))], `, predicted from ${MODES[mode]}`));
+          ...LOOK[one.model] }))], ` from ${MODES[mode]}`));
     }
   }
   return h("div", { className: "figures" }, drawn);
@@ -215,7 +224,7 @@ function made({ made: how, fit, settings, traction }) {
     ["Date", how.date],
     ["Versions", Object.entries(how.versions).map(([name, version]) => `${name} ${version}`).join(", ")],
     ["Traction", traction],
-    ...Object.entries(settings).map(([name, value]) => [name, value === null ? "none" : String(value)]),
+    ...Object.entries(SETTINGS).map(([name, text]) => [text, String(settings[name] ?? "none")]),
     ["Identification", `${fit.simulations} simulations, cost ${units.number(fit.cost)}`],
   ];
   return [

@@ -64,7 +64,7 @@ def test_a_report_opens_from_a_file_and_prints(visit, file):
     text = page.locator("main").inner_text()
     for words in ("Identified parameters", "held out", "SHA-256", "8-DOF", "7-DOF"):
         assert words in text
-    # A first page of tables, then each run from the top of a page on.
+    # Tables, and 16 figures of which a page takes six.
     assert pages(page.pdf(prefer_css_page_size=True)) >= 3
 
 
