@@ -309,7 +309,7 @@ def _add_excitation(command: Parser) -> None:
     command.add_argument("--duration", metavar="S", type=float, help="in place of the manoeuvre's")
     command.add_argument("--lift-off", action="store_true", help="no tyre pulls at the road")
     _add_rims_mode(command, "--braking 6.2:9.8")
-    _add_step(command, "2.5 ms unless told, 5 ms with --rims")
+    _add_step(command, "2.5 ms unless told, 1.25 ms of two-slope dampers, 5 ms with --rims")
 
 
 def _add_vehicle(command: Parser) -> None:

@@ -3,6 +3,7 @@
 Imported with the first of them, because it brings numba and scipy.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from typing import Literal
@@ -12,7 +13,8 @@ from ..engine.excitation import Excitation, FreeExcitation, RimsExcitation
 from ..engine.manoeuvre import Manoeuvre, manoeuvre_from_json, reference_manoeuvres
 from ..engine.recorded_motion import RecordedMotion, recorded_motion
 from ..engine.road_specs import road_spec_from_json
-from ..engine.simulation import FREE_STEP, SAMPLE_STEP
+from ..engine.simulation import SAMPLE_STEP, default_step
+from ..engine.vehicle import Vehicle
 from .errors import InvalidRequest, NotFound
 from .recordings import Recordings, with_braking
 from .schemas import ExcitationForm
@@ -103,25 +105,23 @@ def excitation_of(request: ExcitationForm, recording: Run | RecordedMotion | Non
             recording = recorded_motion(run, request.rims.settings.settings())
         return RimsExcitation(recording, request.rims.traction)
     assert not isinstance(recording, RecordedMotion)
-    step, sample_step = _steps(request)
     motion = manoeuvre_of(request) if recording is None else recording
-    return FreeExcitation(motion, None, request.lift_off, step, sample_step)
+    return FreeExcitation(motion, None, request.lift_off, request.step, _sample_step(request))
 
 
-def extent(request: ExcitationForm, kept: Measurement | None) -> tuple[float, float]:
-    """How long a car is simulated, s, and in how many steps or samples, whichever are more."""
-    if kept is None:
-        duration = manoeuvre_of(request).duration
-        return duration, duration / min(_steps(request))
-    duration = kept.summary["duration"]
-    if request.rims is None:
-        return duration, duration / min(_steps(request))
+def extent(
+    request: ExcitationForm, kept: Measurement | None, cars: Sequence[Vehicle]
+) -> tuple[float, float]:
+    """How long each of some cars is simulated, s, and in how many steps or samples, whichever are
+    more.
+    """
+    duration = manoeuvre_of(request).duration if kept is None else kept.summary["duration"]
+    if request.rims is None or kept is None:
+        step = default_step(*cars) if request.step is None else request.step
+        return duration, duration / min(step, _sample_step(request))
     return duration, max(kept.summary["samples"], duration / request.rims.settings.step)
 
 
-def _steps(request: ExcitationForm) -> tuple[float, float]:
-    """Step and sample step with what holds untold, s."""
-    return (
-        FREE_STEP if request.step is None else request.step,
-        SAMPLE_STEP if request.sample_step is None else request.sample_step,
-    )
+def _sample_step(request: ExcitationForm) -> float:
+    """The sample step with what holds untold, s."""
+    return SAMPLE_STEP if request.sample_step is None else request.sample_step

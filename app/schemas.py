@@ -99,7 +99,8 @@ class ExcitationForm(WireForm):
     """What a car goes through: a manoeuvre ("2" without), a recording's rims, or its posts.
 
     road, duration : in place of the manoeuvre's
-    lift_off, step, sample_step : with a manoeuvre or posts; 2.5 ms and 5 ms unless told
+    lift_off, step, sample_step : with a manoeuvre or posts; untold, the step is the car's
+        (2.5 ms, 1.25 ms with two-slope dampers) and the sample step 5 ms
     """
 
     manoeuvre: KeyOrObject | None = None

@@ -46,7 +46,7 @@ def plan(
         channel(name)
     vehicle = _vehicle(request, session, store)
     kept = recording_of(request, session, store)
-    _check_budget(*extent(request, kept), limits)
+    _check_budget(*extent(request, kept, [vehicle]), limits)
 
     def run() -> Any:
         recording = None if kept is None else recording_in(request, kept, recordings)

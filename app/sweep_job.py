@@ -80,7 +80,7 @@ def check_and_fill(
 ) -> dict[str, Any]:
     """Everything that the job needs, checked, with what holds untold filled in."""
     from ..engine.manoeuvre import manoeuvre_to_json
-    from ..engine.sweep_checks import check_sweep, threads_of
+    from ..engine.sweep_checks import check_sweep, stepped_alike, threads_of, typical_cars
     from ..engine.sweep_file import require_package
     from ..engine.vehicle_file import vehicle_from_json, vehicle_to_json
     from .excitation import excitation_of, extent, manoeuvre_of, mode_of
@@ -88,10 +88,11 @@ def check_and_fill(
     require_package("parquet")
     mode = mode_of(request)
     car, design = vehicle_from_json(vehicle), design_of(request.design)
-    _check_budget(design.cars, extent(request, kept)[1], limits)
+    _check_budget(design.cars, extent(request, kept, typical_cars(car, design))[1], limits)
     run = None if kept is None else recordings.run(kept)
     driven = excitation_of(request, run)
     check_sweep(car, design, driven, threads_of(None))
+    driven = stepped_alike(car, design, driven)
     spec = request.model_dump(mode="json", exclude={"key"})
     spec |= {"vehicle": vehicle_to_json(car), "design": design.to_json()}
     spec["runs"] = [] if kept is None else [{"id": kept.id, "name": kept.name}]

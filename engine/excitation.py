@@ -1,7 +1,7 @@
 """What every car of a sweep goes through: a road or a rig, or the rims of a recording."""
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,11 +15,11 @@ from .recorded_motion import RecordedMotion
 from .rims import for_car
 from .road import Road
 from .simulation import (
-    FREE_STEP,
     SAMPLE_STEP,
     Model,
     Simulation,
     Traction,
+    default_step,
     posts_demand,
     simulate_posts,
     simulate_rims,
@@ -39,7 +39,7 @@ class FreeExcitation:
     motion: Manoeuvre | Run
     road: Road | None = None
     lift_off: bool = False
-    step: float = FREE_STEP
+    step: float | None = None
     sample_step: float = SAMPLE_STEP
 
     def simulate(self, vehicle: Vehicle, model: Model = "8dof") -> Simulation:
@@ -54,6 +54,14 @@ class FreeExcitation:
             return simulate_posts(vehicle, self.motion, **how)
         return simulate_road(vehicle, self.motion, road=self.road, **how)
 
+    def for_cars(self, cars: Sequence[Vehicle]) -> "FreeExcitation":
+        """The same with one step for some cars, where none is told."""
+        return replace(self, step=self.step_of(cars))
+
+    def step_of(self, cars: Sequence[Vehicle]) -> float:
+        """The step that some cars take together, s."""
+        return default_step(*cars) if self.step is None else self.step
+
     def demand(self, vehicle: Vehicle) -> Demand:
         """What acts on a car from outside."""
         if isinstance(self.motion, Run):
@@ -61,14 +69,15 @@ class FreeExcitation:
         return self.motion.demand(vehicle, self.road)
 
     def longest_step(self, vehicle: Vehicle) -> float:
-        """The longest step that is taken, s; the same for every car.
+        """The longest step that a car takes, s.
 
         Raises SimulationError for a duration, a step or a sampling outside what is accepted.
         """
         duration = self.motion.duration
         still = PiecewiseLinear.zero(duration)
         demand = Demand(duration, 0.0, still, still, None)
-        return float(prepare_free(demand, self.step, self.sample_step).steps.max())
+        step = self.step_of([vehicle])
+        return float(prepare_free(demand, step, self.sample_step).steps.max())
 
     def eigenvalues(self, vehicle: Vehicle) -> NDArray[np.complex128]:
         """Of a car at rest under its greatest brake torques, 1/s."""
@@ -97,6 +106,10 @@ class RimsExcitation:
     def simulate(self, vehicle: Vehicle, model: Model = "8dof") -> Simulation:
         """One car through all of it; raises what the simulation raises."""
         return simulate_rims(vehicle, self.motion, traction=self.traction, model=model)
+
+    def for_cars(self, cars: Sequence[Vehicle]) -> "RimsExcitation":
+        """The same: the step was told when the motion was made."""
+        return self
 
     def longest_step(self, vehicle: Vehicle) -> float:
         """The longest step that is taken, s; MeasurementError for marks outside the run."""

@@ -76,19 +76,20 @@ def side_by_side(excitation: Excitation, cars: Sequence[Vehicle]) -> SideBySide 
     if isinstance(excitation, RimsExcitation):
         return _on_rims(excitation, [for_car(excitation.motion, car) for car in cars])
     demands = [excitation.demand(car) for car in cars]
-    prepared = [prepare_free(one, excitation.step, excitation.sample_step) for one in demands]
+    step = excitation.step_of(cars)
+    prepared = [prepare_free(one, step, excitation.sample_step) for one in demands]
     inputs, brake = prepared[0], demands[0].brake.values.max(axis=0)
     if not all(_same(inputs, other) for other in prepared[1:]):
         return None
     run = excitation.simulate(cars[0]).run
     reduced = reduction(run, inputs.steps, _POINT, _POSITION)
-    step = float(inputs.steps.max())
+    longest = float(inputs.steps.max())
     return SideBySide(
         inputs.time,
         excitation.lift_off,
         reduced,
         lambda rows, threads: free_tallies(rows, inputs, reduced, threads),
-        lambda rows: stable_on_road(rows, brake, step),
+        lambda rows: stable_on_road(rows, brake, longest),
     )
 
 

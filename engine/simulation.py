@@ -45,6 +45,9 @@ Traction = Literal["exact", "paper"]
 FREE_STEP = 0.0025
 """Integration step of the road and posts modes, s: wheel hop is in them. Two make a sample step."""
 
+BENT_STEP = 0.00125
+"""The same of a car with two-slope dampers, whose kinks lower the integrator's order to 2."""
+
 FASTEST = 150.0
 """Greatest speed that a simulation may reach, m/s."""
 
@@ -71,6 +74,12 @@ class Simulation:
     warnings: tuple[str, ...] = ()
 
 
+def default_step(*cars: Vehicle) -> float:
+    """Integration step of the road and posts modes for cars that take the same, s."""
+    linear = (car.axle(axle).suspension.linear for car in cars for axle in AXLES)
+    return FREE_STEP if all(linear) else BENT_STEP
+
+
 def simulate_road(
     vehicle: Vehicle,
     manoeuvre: Manoeuvre,
@@ -78,7 +87,7 @@ def simulate_road(
     road: Road | None = None,
     model: Model = "8dof",
     lift_off: bool = False,
-    step: float = FREE_STEP,
+    step: float | None = None,
     sample_step: float = SAMPLE_STEP,
     points: Points = DEFAULT_POINTS,
 ) -> Simulation:
@@ -86,6 +95,7 @@ def simulate_road(
 
     road : takes the place of the manoeuvre's own; a warning tells where the car leaves it
     lift_off : tyres do not pull
+    step : longest integration step, s; `default_step` of the car without
     Raises SimulationError for a manoeuvre of the other kind or steps outside what is accepted or
     too long for the car, SimulationDiverged when the car leaves the model's range.
     """
@@ -108,7 +118,7 @@ def simulate_posts(
     *,
     model: Model = "8dof",
     lift_off: bool = False,
-    step: float = FREE_STEP,
+    step: float | None = None,
     sample_step: float = SAMPLE_STEP,
     points: Points = DEFAULT_POINTS,
 ) -> Simulation:
@@ -206,13 +216,14 @@ def _free(
     demand: Demand,
     model: Model,
     lift_off: bool,
-    step: float,
+    step: float | None,
     sample_step: float,
     points: Points,
 ) -> Simulation:
     """Road and posts modes, which differ only in what moves the contact points."""
     _require_choice("model", model, Model)
-    inputs = prepare_free(demand, step, sample_step)
+    untold = default_step(vehicle)
+    inputs = prepare_free(demand, untold if step is None else step, sample_step)
     if model == "7dof":
         if demand.posts is not None:
             result = baseline.simulate_posts(vehicle, demand.posts, sample_step, points)
@@ -226,7 +237,7 @@ def _free(
             _load_shares(result),
             inputs.steps.size,
             warnings=(
-                *_ignored(lift_off=lift_off, step=step != FREE_STEP),
+                *_ignored(lift_off=lift_off, step=step not in (None, untold)),
                 *_straightened(vehicle),
             ),
         )

@@ -19,7 +19,7 @@ from .excitation import Excitation
 from .figures import OK, figures, figures_of, reason
 from .parameters import ALL_PARAMETERS
 from .side_by_side import SideBySide, side_by_side
-from .sweep_checks import check_sweep, threads_of, typical_cars
+from .sweep_checks import check_sweep, stepped_alike, threads_of, typical_cars
 from .vehicle import Vehicle, numbers
 
 Block = dict[str, NDArray]
@@ -85,6 +85,7 @@ def sweep(
     """
     threads = threads_of(threads)
     check_sweep(vehicle, design, excitation, threads)
+    excitation = stepped_alike(vehicle, design, excitation)
     return _blocks(vehicle, design, excitation, threads, progress, cancelled)
 
 

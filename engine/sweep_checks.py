@@ -47,6 +47,7 @@ def check_sweep(vehicle: Vehicle, design: Design, excitation: Excitation, thread
     """
     for name in design.names:
         vehicle.value(name)
+    excitation = stepped_alike(vehicle, design, excitation)
     middle = _car_at(vehicle, design, 0.5 * (design.low + design.high)) or vehicle
     _check_step(vehicle, design, excitation, excitation.longest_step(middle))
     _run(middle, excitation)
@@ -59,6 +60,11 @@ def check_sweep(vehicle: Vehicle, design: Design, excitation: Excitation, thread
             f" {seconds:.2g} s a car they would take {_span(design.cars * seconds / threads)};"
             " take fewer."
         )
+
+
+def stepped_alike(vehicle: Vehicle, design: Design, excitation: Excitation) -> Excitation:
+    """The excitation with one step for all cars of a design."""
+    return excitation.for_cars(typical_cars(vehicle, design))
 
 
 def typical_cars(vehicle: Vehicle, design: Design) -> list[Vehicle]:

@@ -98,6 +98,15 @@ def random_vehicle(rng, *, braked=None, outside=0.15, offsets=True):
     return vehicle
 
 
+DAMPERS = {
+    "front.suspension.rebound_ratio": 2.5,
+    "front.suspension.knee_speed": 0.4,
+    "rear.suspension.rebound_ratio": 2.0,
+    "rear.suspension.knee_speed": 0.2,
+}
+"""Two-slope dampers as road cars have them, SI."""
+
+
 def with_random_dampers(vehicle, rng):
     """The car with two-slope dampers, each axle with a knee or without."""
     axles = {

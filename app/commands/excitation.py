@@ -11,7 +11,6 @@ from ...engine.measurement import read_run
 from ...engine.recorded_motion import recorded_motion
 from ...engine.road_file import read_road
 from ...engine.road_specs import IsoRoad
-from ...engine.simulation import FREE_STEP
 from .arguments import rims_settings
 from .inputs import find_manoeuvre, read_runs, recording_files
 
@@ -55,10 +54,7 @@ def excitation(options: Namespace, mode: Mode) -> Excitation:
         [run] = read_runs([options.rims], options.braking or ())
         motion = recorded_motion(run, rims_settings(options))
         return RimsExcitation(motion, options.traction or "exact")
-    how: dict[str, Any] = {
-        "lift_off": options.lift_off,
-        "step": FREE_STEP if options.step is None else options.step,
-    }
+    how: dict[str, Any] = {"lift_off": options.lift_off, "step": options.step}
     if mode == "posts":
         return FreeExcitation(read_run(options.posts), **how)
     manoeuvre = find_manoeuvre(options.manoeuvre)

@@ -11,6 +11,7 @@ from ...engine.figures import reason
 from ...engine.measurement import run_to_csv
 from ...engine.sweep import Progress, car_of
 from ...engine.sweep import sweep as sweep_cars
+from ...engine.sweep_checks import stepped_alike
 from ...engine.sweep_file import description, form_of, write_blocks
 from ...engine.vehicle import Vehicle
 from ...engine.vehicle_file import write_vehicle
@@ -40,6 +41,7 @@ def sweep(options: Namespace) -> None:
     summary = Summary()
     with watch(_line) as progress:
         blocks = sweep_cars(vehicle, design, driven, threads=options.threads, progress=progress)
+        driven = stepped_alike(vehicle, design, driven)
         files = _history_files(options, numbers, inputs)
         with whole_file(options.output) as stream:
             write_blocks(stream, form, description(vehicle, design, driven), summary.noting(blocks))

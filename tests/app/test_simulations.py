@@ -166,6 +166,15 @@ REFUSED = {
         422,
         "6000000 steps",
     ),
+    "too long with bent dampers": (
+        {
+            "manoeuvre": {"name": "x", "kind": "road", "duration": 600},
+            "vehicle": PAPER,
+            "values": {"rear.suspension.knee_speed": 0.4},
+        },
+        422,
+        "480000 steps",
+    ),
     "road under a rig": ({"manoeuvre": "heave", "road": {"kind": "flat"}}, 422, "rig"),
     "road without kind": ({"road": {"sections": []}}, 422, "kind"),
     "misspelt vehicle": ({"vehicle": {**PAPER, "chasis": {}}}, 422, "chassis"),

@@ -15,11 +15,18 @@ from ridetune.engine.integration import free_states
 from ridetune.engine.manoeuvre import reference_manoeuvres
 from ridetune.engine.rims import prepare
 from ridetune.engine.rims_settings import RimsSettings
-from ridetune.engine.simulation import FREE_STEP, SAMPLE_STEP, rims_batch, simulate_road
+from ridetune.engine.simulation import (
+    FREE_STEP,
+    SAMPLE_STEP,
+    default_step,
+    rims_batch,
+    simulate_posts,
+    simulate_road,
+)
 from ridetune.engine.stepping import prepare_free
 from ridetune.engine.vehicle_file import reference_vehicles
 
-from ..factories import paper_vehicle
+from ..factories import DAMPERS, paper_vehicle
 
 NEAR = 1e-4
 """Accepted error at the default steps, relative to the range of each coordinate."""
@@ -87,11 +94,33 @@ def test_the_default_step_is_near_the_converged_run(car, manoeuvre):
     assert error(free_motion(vehicle, demand, FREE_STEP), converged) < NEAR
 
 
-def test_the_default_step_is_near_the_converged_run_on_the_rig():
+@pytest.mark.parametrize("manoeuvre", ["1", "2"])
+@pytest.mark.parametrize("car", reference_vehicles())
+def test_the_default_step_of_a_bent_car_is_near_the_converged_run(car, manoeuvre):
+    """Oracle: a sixteenth of the step, whose error is 16^2 times less: the kinks leave order 2."""
+    vehicle = reference_vehicles()[car].with_values(DAMPERS)
+    demand, step = reference_manoeuvres()[manoeuvre].demand(vehicle), default_step(vehicle)
+    converged = free_motion(vehicle, demand, step / 16)
+    assert error(free_motion(vehicle, demand, step), converged) < 1.5 * NEAR
+
+
+@pytest.mark.parametrize("dampers", [{}, DAMPERS], ids=["linear", "bent"])
+def test_the_default_step_is_near_the_converged_run_on_the_rig(dampers):
     """Oracle: as above."""
-    vehicle, demand = paper_vehicle(), rig()
-    converged = free_motion(vehicle, demand, FREE_STEP / 16)
-    assert error(free_motion(vehicle, demand, FREE_STEP), converged) < NEAR
+    vehicle, demand = paper_vehicle().with_values(dampers), rig()
+    step = default_step(vehicle)
+    converged = free_motion(vehicle, demand, step / 16)
+    assert error(free_motion(vehicle, demand, step), converged) < NEAR
+
+
+@pytest.mark.parametrize("name", DAMPERS)
+def test_one_bend_makes_the_default_step_shorter(name):
+    """Oracle: the number of steps of a car whose step is told."""
+    linear, bent = paper_vehicle(), paper_vehicle().with_values({name: DAMPERS[name]})
+    for simulate, key in ((simulate_road, "bump"), (simulate_posts, "heave")):
+        manoeuvre = reference_manoeuvres()[key]
+        assert simulate(linear, manoeuvre).steps == simulate(bent, manoeuvre, step=0.0025).steps
+        assert simulate(bent, manoeuvre).steps == simulate(linear, manoeuvre, step=0.00125).steps
 
 
 @pytest.mark.parametrize("manoeuvre", ["1", "2"])
@@ -105,3 +134,18 @@ def test_the_default_step_is_near_the_converged_run_on_rims(manoeuvre):
         rims_batch(row, prepare(run, vehicle, how), "exact")[0] for how in (settings, fine)
     )
     assert error(found, converged) < NEAR
+
+
+def test_the_kink_costs_the_default_step_on_rims_three_thousandths_at_most():
+    """Oracle: as above; a quarter of the step has a 16th of the error."""
+    vehicle = paper_vehicle().with_values(DAMPERS)
+    run = simulate_road(vehicle, reference_manoeuvres()["2"]).run
+    row = car_row(vehicle)[np.newaxis]
+
+    def motion(part):
+        settings = RimsSettings(step=RimsSettings().step * part)
+        return rims_batch(row, prepare(run, vehicle, settings), "exact")[0]
+
+    converged = motion(1 / 16)
+    assert error(motion(1.0), converged) < 30 * NEAR
+    assert error(motion(1 / 4), converged) < NEAR

@@ -8,31 +8,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from ridetune.engine.car_rows import car_row, car_rows
 from ridetune.engine.errors import SimulationError
 from ridetune.engine.frames import CORNERS
-from ridetune.engine.integration import free_states
 from ridetune.engine.manoeuvre import reference_manoeuvres
 from ridetune.engine.rims import prepare
-from ridetune.engine.rims_settings import RimsSettings
-from ridetune.engine.simulation import (
-    FREE_STEP,
-    SAMPLE_STEP,
-    rims_batch,
-    simulate_posts,
-    simulate_road,
-)
+from ridetune.engine.simulation import rims_batch, simulate_posts, simulate_road
 from ridetune.engine.stability import check_free_step, is_stable, rims_eigenvalues, road_eigenvalues
-from ridetune.engine.stepping import prepare_free
 
-from ..factories import paper_vehicle, random_vehicle, with_random_dampers
-
-NEAR = 1e-4
-"""Relative to the range of each coordinate."""
-
-DAMPERS = {
-    "front.suspension.rebound_ratio": 2.5,
-    "front.suspension.knee_speed": 0.4,
-    "rear.suspension.rebound_ratio": 2.0,
-    "rear.suspension.knee_speed": 0.2,
-}
+from ..factories import DAMPERS, paper_vehicle, random_vehicle, with_random_dampers
 
 
 @pytest.fixture(scope="module")
@@ -109,43 +90,6 @@ def test_many_cars_have_the_rows_of_each_alone():
     values = np.array([list(DAMPERS.values())]) * np.array([[0.5], [1.0], [1.5]])
     alone = [car_row(car.with_values(dict(zip(names, row, strict=True)))) for row in values]
     assert_allclose(car_rows(car, names, values), alone, rtol=1e-15)
-
-
-def errors(motion, step):
-    """Greatest error of a motion with a step and with a quarter of it, against a sixteenth, over
-    each one's range."""
-    converged = motion(step / 16)
-    return [
-        np.max(np.abs(motion(part * step) - converged) / np.ptp(converged, axis=0))
-        for part in (1.0, 0.25)
-    ]
-
-
-@pytest.mark.parametrize("manoeuvre", ["1", "2"])
-def test_the_kink_costs_the_road_s_default_step_a_thousandth_at_most(bent, manoeuvre):
-    """Oracle: a sixteenth of the step; the kink leaves order 2, so a quarter has a 16th of the
-    error."""
-    demand = reference_manoeuvres()[manoeuvre].demand(bent)
-
-    def motion(step):
-        states = free_states(car_row(bent)[np.newaxis], prepare_free(demand, step, SAMPLE_STEP))
-        return states.values[0, :, 1:8]
-
-    whole, quarter = errors(motion, FREE_STEP)
-    assert whole < 10 * NEAR
-    assert quarter < NEAR
-
-
-def test_the_kink_costs_the_default_step_on_rims_three_thousandths_at_most(bent, ride):
-    """Oracle: as above."""
-
-    def motion(step):
-        inputs = prepare(ride, bent, RimsSettings(step=step))
-        return rims_batch(car_row(bent)[np.newaxis], inputs, "exact")[0]
-
-    whole, quarter = errors(motion, RimsSettings().step)
-    assert whole < 30 * NEAR
-    assert quarter < NEAR
 
 
 def test_a_step_is_bounded_by_the_steeper_slope():

@@ -90,6 +90,15 @@ def test_each_row_is_its_car_simulated_alone(case, ranges):
         assert_figures(has_found, run, car, SHARP)
 
 
+@pytest.mark.parametrize("other", [{}, {"chassis.mass": [900.0, 1300.0]}], ids=["alike", "not"])
+def test_all_cars_of_a_sweep_take_the_step_that_its_bent_ones_need(other):
+    """Oracle: the same sweep with that step told."""
+    design = FullFactorial({"rho_R": [1.0, 2.5], **other})
+    found, told = (rows(CAR, design, FreeExcitation(BUMP, step=step)) for step in (None, 0.00125))
+    for name, values in told.items():
+        assert_array_equal(found[name], values)
+
+
 def test_cars_that_are_driven_alike_go_side_by_side():
     """Oracle: a torque that holds a speed or a deceleration follows from the mass, no other."""
     for name, (vehicle, excitation) in excitations().items():
