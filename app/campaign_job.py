@@ -4,27 +4,28 @@ The worker gets everything by value and gives the files back as one archive, so 
 database nor the data directory and may be another machine.
 """
 
-import hashlib
-import io
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
-from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
+from .campaign_archive import CampaignArchive
 from .errors import InvalidRequest, OverBudget
 from .job_store import Job
 from .jobs import Kind, digest
-from .plants import known_plant
+from .plants import Known, known_plant
 from .schemas import CampaignRequest
 from .settings import Limits
 from .worker import CutShort, Report, WithFile
 
 if TYPE_CHECKING:
-    from ..engine.campaign import Campaign, Recording
+    from ..engine.campaign import Campaign
 
 KIND = "campaign"
+
+GRACE = 15.0
+"""How long a cancelled campaign has to hand over its recordings, s: they may have taken minutes."""
 
 NAME = re.compile(r"[A-Za-z0-9_-]{1,60}")
 """What a recording may be called: it becomes a file's name."""
@@ -42,7 +43,7 @@ def campaign() -> Kind:
     def payload(job: Job) -> dict[str, Any]:
         return job.spec
 
-    return Kind(task=drive_manoeuvres, payload=payload)
+    return Kind(task=drive_manoeuvres, payload=payload, grace=GRACE)
 
 
 def as_asked(request: CampaignRequest) -> str:
@@ -78,7 +79,7 @@ def check_and_fill(
         "date": datetime.now(UTC).replace(microsecond=0).isoformat(),
     }
     planned = _planned(spec)
-    _check_budget(planned, limits)
+    _check_budget(planned, known, limits)
     car = vehicle_to_json(planned.plant.vehicle) if known.takes_vehicle else None
     return {**spec, "vehicle": car, "most_bytes": most_bytes(planned)}
 
@@ -113,6 +114,7 @@ def _planned(spec: Mapping[str, Any]) -> "Campaign":
     from ..engine.campaign import Campaign
     from ..engine.manoeuvre import manoeuvre_from_json
     from ..engine.sensor_file import noisy, sensors_from_json
+    from ..engine.vehicle_file import vehicle_from_json
 
     sensors = (
         noisy(spec["noise"], "noise")
@@ -120,18 +122,21 @@ def _planned(spec: Mapping[str, Any]) -> "Campaign":
         else sensors_from_json(spec["sensors"])
     )
     driven = {key: manoeuvre_from_json(one, key) for key, one in spec["manoeuvres"].items()}
-    plant = known_plant(spec["plant"]).make(spec["vehicle"])
+    plant = known_plant(spec["plant"]).make(lambda: vehicle_from_json(spec["vehicle"]))
     return Campaign.plan(plant, sensors, driven, spec["seed"])
 
 
-def _check_budget(planned: "Campaign", limits: Limits) -> None:
+def _check_budget(planned: "Campaign", known: Known, limits: Limits) -> None:
     """Refuse drives that together are longer than a campaign over REST takes."""
-    if planned.seconds > limits.driven_seconds:
-        raise OverBudget(
-            f"The manoeuvres last {planned.seconds:g} s together, a campaign over REST takes at"
-            f" most {limits.driven_seconds:g} s; leave some out or shorten them, or use the command"
-            " ridetune campaign."
-        )
+    plant = planned.plant
+    most = limits.long_driven_seconds if plant.long else limits.driven_seconds
+    if planned.seconds <= most:
+        return
+    why = f" of the {plant.name} car, {known.effort:g} s a driven second," if plant.long else ""
+    raise OverBudget(
+        f"The manoeuvres last {planned.seconds:g} s together, a campaign{why} over REST takes at"
+        f" most {most:g} s; leave some out or shorten them, or use the command ridetune campaign."
+    )
 
 
 def most_bytes(planned: "Campaign") -> int:
@@ -150,54 +155,13 @@ def drive_manoeuvres(payload: Any, report: Report, cancelled: Callable[[], bool]
     from ..engine.errors import Cancelled
 
     planned = _planned(payload)
-    kept: list[Recording] = []
+    archive = CampaignArchive(planned, payload["format"], datetime.fromisoformat(payload["date"]))
     try:
+        # One after the other: a worker may not have processes of its own.
         for recording in drive(
             planned, processes=1, progress=lambda now: report(asdict(now)), cancelled=cancelled
         ):
-            kept.append(recording)
+            archive.add(recording)
     except Cancelled:
-        raise CutShort(_archived(planned, kept, payload)) from None
-    return _archived(planned, kept, payload)
-
-
-def _archived(
-    planned: "Campaign", kept: "Iterable[Recording]", payload: Mapping[str, Any]
-) -> WithFile:
-    """All files, and what became of each drive."""
-    from ..engine.recording_files import files_of, files_of_car
-
-    form, date = payload["format"], datetime.fromisoformat(payload["date"])
-    files, ended = files_of_car(planned), {one.name: one for one in kept}
-    for recording in ended.values():
-        files |= files_of(recording, planned, form, date)
-    stream = io.BytesIO()
-    with ZipFile(stream, "w") as archive:
-        for name, data in files.items():
-            entry = ZipInfo(name, date.timetuple()[:6])
-            entry.external_attr = 0o644 << 16
-            archive.writestr(entry, data, ZIP_DEFLATED)
-    listed = {
-        name: {"name": name, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
-        for name, data in files.items()
-    }
-    recordings = [_became(name, ended.get(name), listed, form) for name in planned.manoeuvres]
-    return WithFile({"recordings": recordings, "files": list(listed.values())}, stream.getvalue())
-
-
-def _became(
-    name: str, recording: "Recording | None", listed: Mapping[str, Any], form: str
-) -> dict[str, Any]:
-    """What became of one drive: whole, the part before it broke off, or missing, and why."""
-    if recording is None:
-        failure = "The campaign was cancelled before this drive ended."
-        return {"name": name, "state": "missing", "failure": failure, "file": None, "sha256": None}
-    state = "missing" if recording.run is None else "partial" if recording.failure else "whole"
-    file = listed.get(f"{name}.partial.{form}" if state == "partial" else f"{name}.{form}")
-    return {
-        "name": name,
-        "state": state,
-        "failure": recording.failure,
-        "file": file and file["name"],
-        "sha256": file and file["sha256"],
-    }
+        raise CutShort(archive.closed()) from None
+    return archive.closed()

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from ..engine.errors import RideError
+from .plants import PLANTS
 
 BAD_INPUT = 2
 INTERRUPTED = 130  # 128 + SIGINT, as shells report it
@@ -257,7 +258,7 @@ def _add_identification(command: Parser) -> None:
 def _describe_campaign(command: Parser) -> None:
     command.add_argument(
         "--plant",
-        choices=("detailed", "concept"),
+        choices=tuple(PLANTS),
         default="concept",
         help="car to drive; detailed: the multibody car, some minutes a drive",
     )

@@ -35,10 +35,14 @@ def digest(form: Mapping[str, Any]) -> str:
 
 @dataclass(frozen=True)
 class Kind:
-    """What a job of one kind does: `payload` gathers here what `task` needs on a worker."""
+    """What a job of one kind does: `payload` gathers here what `task` needs on a worker.
+
+    grace : how long a task that is cancelled may take to stop before its worker is killed, s
+    """
 
     task: Task
     payload: Callable[[Job], Any]
+    grace: float = GRACE
 
 
 class Jobs:
@@ -183,7 +187,7 @@ class Jobs:
                 self._cluster.submit(job.id, kind.task, payload, self)
             if job.id in self._cancelled:
                 # Perhaps only since: what was cancelled before it was there goes now.
-                self._cluster.cancel(job.id, GRACE)
+                self._cluster.cancel(job.id, kind.grace)
         except RideError as error:
             self._fail(job.id, error.code, str(error))
         except Exception:
@@ -195,7 +199,7 @@ class Jobs:
             self._cancelled.add(job.id)
             self._store.jobs.finish(job.id, "cancelled")
             self._wake(job.id)
-        self._canceller.submit(self._cluster.cancel, job.id, GRACE)
+        self._canceller.submit(self._cluster.cancel, job.id, self._kinds[job.kind].grace)
 
     def _fail(self, job: str, code: str, detail: str) -> None:
         self._finish(job, "failed", error={"code": code, "detail": detail})

@@ -126,10 +126,13 @@ def manoeuvre(key: str) -> dict[str, Any]:
 
 @router.get("/plants")
 def plants() -> list[dict[str, Any]]:
-    """The cars that a campaign can drive."""
-    shown = ("name", "takes_vehicle")
+    """The cars that a campaign can drive.
+
+    effort : s that a driven second takes, about;  missing : why one cannot be driven here, else ""
+    """
+    shown = ("name", "takes_vehicle", "effort")
     return [
-        {"key": key, **{field: getattr(one, field) for field in shown}}
+        {"key": key, **{field: getattr(one, field) for field in shown}, "missing": one.missing()}
         for key, one in PLANTS.items()
     ]
 

@@ -8,15 +8,14 @@ from pathlib import Path
 
 from ...engine.campaign import CAMPAIGN, Campaign, Recording, roughened
 from ...engine.campaign_run import CampaignProgress, drive
-from ...engine.detailed.car_file import reference_car
-from ...engine.detailed.plant import DetailedPlant
 from ...engine.errors import CampaignError
 from ...engine.manoeuvre import Manoeuvre
 from ...engine.mdf4 import require_asammdf
-from ...engine.plant import ConceptPlant, Plant
+from ...engine.plant import Plant
 from ...engine.recording_files import files_of, files_of_car, names_of
 from ...engine.sensor_file import noisy, read_sensors
 from ...engine.sensors import SensorSet
+from ..plants import PLANTS
 from .arguments import ArgumentError, band
 from .inputs import find_manoeuvre, find_vehicle, read_noise
 from .output import make_folder, refuse_input, refuse_to_overwrite, require_writable, whole_file
@@ -65,14 +64,13 @@ def _plan(options: Namespace) -> Campaign:
 
 def _plant(options: Namespace) -> Plant:
     """The car that drives."""
-    if options.plant == "concept":
-        return ConceptPlant(find_vehicle(options.vehicle or "paper"))
-    if options.vehicle is not None:
+    known = PLANTS[options.plant]
+    if options.vehicle is not None and not known.takes_vehicle:
         raise ArgumentError(
-            f"--vehicle {options.vehicle}: the detailed car brings its own data; leave out"
-            " --vehicle or --plant detailed."
+            f"--vehicle {options.vehicle}: the {options.plant} car brings its own data; leave out"
+            f" --vehicle or --plant {options.plant}."
         )
-    return DetailedPlant.of(reference_car())
+    return known.make(lambda: find_vehicle(options.vehicle or "paper"))
 
 
 def _manoeuvres(names: list[str] | tuple[str, ...]) -> dict[str, Manoeuvre]:

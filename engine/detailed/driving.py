@@ -40,8 +40,8 @@ SPECTRAL_RADIUS = 0.8
 TOLERANCE = 1e-4
 """Of Newton's residual; 1e-3 is seen in z and pitch."""
 
-REPORT = 100
-"""Steps between two reports of progress."""
+REPORT = 20
+"""Steps between two reports of progress, which take 0.05 s of CPU."""
 
 ASTRAY = 0.5
 """m: a body this far from its place in the car means that the run has diverged."""

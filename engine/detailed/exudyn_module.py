@@ -12,14 +12,21 @@ from ..errors import SimulationError
 INSTALL = 'pip install "ridetune[detailed]"'
 
 
+def missing_exudyn() -> str:
+    """What to do where Exudyn is missing, a sentence; empty where it is installed."""
+    if find_spec("exudyn") is not None:
+        return ""
+    return f"The detailed car is solved by Exudyn; install it: {INSTALL}"
+
+
 def require_exudyn() -> tuple[Any, Any]:
     """The modules exudyn and exudyn.itemInterface, without what they print.
 
     Exudyn's fast build is asked for, which checks no ranges. Raises SimulationError with the way
     to install it where it is missing.
     """
-    if find_spec("exudyn") is None:
-        raise SimulationError(f"The detailed car is solved by Exudyn; install it: {INSTALL}")
+    if said := missing_exudyn():
+        raise SimulationError(said)
     if "exudyn" not in sys.modules:
         sys.exudynFast = True  # pyright: ignore[reportAttributeAccessIssue]  # read by the import
     with redirect_stdout(StringIO()):

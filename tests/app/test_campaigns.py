@@ -11,7 +11,9 @@ from ridetune.app.settings import Limits, Settings
 from ridetune.app.worker import CutShort
 from ridetune.engine.campaign import CAMPAIGN, Campaign, chosen, roughened
 from ridetune.engine.campaign_run import drive
-from ridetune.engine.manoeuvre import manoeuvre_to_json, reference_manoeuvres
+from ridetune.engine.detailed.car_file import reference_car
+from ridetune.engine.detailed.plant import DetailedPlant
+from ridetune.engine.manoeuvre import manoeuvre_from_json, manoeuvre_to_json, reference_manoeuvres
 from ridetune.engine.measurement import run_to_csv
 from ridetune.engine.plant import ConceptPlant
 from ridetune.engine.sensor_file import noisy
@@ -231,7 +233,8 @@ def test_a_running_campaign_has_no_files_until_it_is_cancelled(engineer):
 
 REFUSED = {
     "unknown plant": ({"plant": "concpt"}, "did you mean concept?"),
-    "another plant": ({"plant": "lorry"}, "there is concept"),
+    "another plant": ({"plant": "lorry"}, "there are concept, detailed."),
+    "a vehicle for a car with its own data": ({"plant": "detailed"}, "leave out vehicle"),
     "unknown manoeuvre": ({"manoeuvres": ["brake-55"]}, "did you mean brake-54?"),
     "no manoeuvre": ({"manoeuvres": []}, "has no manoeuvre"),
     "a manoeuvre twice": ({"manoeuvres": ["1", "1"]}, "names 1 twice"),
@@ -260,6 +263,11 @@ REFUSED = {
     "a misspelt field": ({"sensor": {}}, "field sensor is not known here"),
     "no car": ({"vehicle": {}}, "name is missing"),
     "too long": ({"manoeuvres": {f"d{k}": "1" for k in range(31)}}, "620 s together"),
+    "too long for a car that takes long": (
+        {"plant": "detailed", "vehicle": None, "manoeuvres": {f"d{k}": "1" for k in range(11)}},
+        "220 s together, a campaign of the detailed car, 2.5 s a driven second, over REST takes at"
+        " most 200 s; leave some out",
+    ),
     "too much": (
         {
             "noise": {},
@@ -308,5 +316,49 @@ def test_the_same_key_drives_once(tmp_path, monkeypatch):
 
 
 def test_the_plants_are_listed(client):
-    plants = client.get("/api/plants").json()
-    assert plants[0] == {"key": "concept", "name": "Concept car", "takes_vehicle": True}
+    concept, detailed = client.get("/api/plants").json()
+    assert (concept["key"], concept["takes_vehicle"], concept["missing"]) == ("concept", True, "")
+    assert (detailed["key"], detailed["takes_vehicle"], detailed["missing"]) == (
+        "detailed",
+        False,
+        "",
+    )
+    assert detailed["effort"] > 1000 * concept["effort"]
+
+
+def test_a_car_whose_solver_is_not_installed_is_listed_and_refused(visitor, monkeypatch):
+    monkeypatch.setattr("ridetune.engine.detailed.exudyn_module.find_spec", lambda name: None)
+    _, detailed = visitor.client.get("/api/plants").json()
+    assert detailed["missing"].endswith('install it: pip install "ridetune[detailed]"')
+    refused = visitor.post("/campaigns", json={"plant": "detailed", "manoeuvres": ["bump"]})
+    assert (refused.status_code, refused.json()["detail"]) == (422, detailed["missing"])
+    assert visitor.get("/campaigns").json() == []
+
+
+def test_the_detailed_car_tells_how_far_it_is_and_stops_in_the_midst_of_a_drive(engineer):
+    """Oracle: the engine called directly, of the drive that ends before the campaign is cancelled.
+
+    The second drive would take minutes; what it has reported by then lies between its ends.
+    """
+    pull = {"kind": "table", "time": [0.0, 0.2], "torque": [0.0, 600.0]}
+    short = {"name": "pull", "kind": "road", "duration": 0.4, "drive": pull}
+    asked = {"plant": "detailed", "vehicle": None, "noise": {}, "seed": 0}
+    job = submit(engineer, **asked, manoeuvres={"pull": short, "rest": {**short, "duration": 60}})
+    told, deadline = set(), time.monotonic() + PATIENCE
+    while len([seconds for seconds in told if seconds > 0.4]) < 3:
+        assert time.monotonic() < deadline, told
+        told.add(engineer.get(f"/campaigns/{job['id']}").json()["progress"].get("driven", 0.0))
+    engineer.post(f"/campaigns/{job['id']}/cancel")
+    ended = wait_for(engineer, job["id"], "cancelled", "done", "failed")
+    assert max(told) < 60.0
+    assert ended["progress"]["runs"] == 1
+    whole, missing = ended["result"]["recordings"]
+    assert (ended["state"], whole["state"], missing["state"]) == ("cancelled", "whole", "missing")
+    plant = DetailedPlant.of(reference_car())
+    campaign = Campaign.plan(plant, noisy({}, "noise"), {"pull": manoeuvre_from_json(short)})
+    [recording] = drive(campaign, processes=1)
+    assert recording.run is not None
+    assert text(engineer, ended, "manoeuvre_pull.csv") == run_to_csv(recording.run)
+    known = engineer.get(f"/campaigns/{ended['id']}/files/vehicle.json").json()
+    assert known == vehicle_to_json(plant.vehicle)
+    assert engineer.put("/vehicle", json=known).status_code == 200

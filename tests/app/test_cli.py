@@ -16,6 +16,8 @@ import pytest
 from numpy.testing import assert_allclose
 from ridetune.app.cli import main
 from ridetune.engine.channels import Run
+from ridetune.engine.detailed.car_file import reference_car
+from ridetune.engine.detailed.plant import DetailedPlant
 from ridetune.engine.measurement import read_run, write_run
 from ridetune.engine.parameters import PARAMETER_NAMES
 from ridetune.engine.sensors import RECORDED as SENSED
@@ -442,6 +444,16 @@ def test_mdf4_without_its_package_says_what_to_install(folder, capsys, monkeypat
     message = refused(capsys, "campaign", "--format", "mf4", "-o", "runs")
     assert message.endswith("install ridetune[mdf], or take CSV.")
     assert not list(folder.iterdir())
+
+
+def test_the_detailed_car_drives_and_leaves_what_is_known_of_it(folder, capsys):
+    """Oracle: the plant of the engine."""
+    (folder / "wait.json").write_text('{"name": "wait", "kind": "road", "duration": 0.2}')
+    command = ["campaign", "--plant", "detailed", "--manoeuvre", "wait.json", "-o", "runs"]
+    assert main(command) == 0
+    known = read_vehicle(folder / "runs" / "vehicle.json")
+    assert known == DetailedPlant.of(reference_car()).vehicle
+    assert read_run(folder / "runs" / "manoeuvre_wait.csv").duration == pytest.approx(0.2)
 
 
 def test_the_detailed_car_without_its_package_says_what_to_install(folder, capsys, monkeypatch):

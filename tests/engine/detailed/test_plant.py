@@ -101,7 +101,8 @@ def test_it_stops_soon_after_it_is_asked_to():
             progress=told.append,
             cancelled=lambda: len(told) > 1,
         )
-    assert_allclose(told, [0.0, 0.1], atol=1e-9)
+    assert len(told) == 2
+    assert told[-1] <= 0.02
 
 
 def test_processes_record_what_one_process_does():
