@@ -2,8 +2,10 @@
 
 import csv
 import io
-from collections.abc import Iterator
+import time
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
@@ -12,6 +14,8 @@ from ridetune.app.settings import Limits, Settings
 
 ADDRESS = "http://127.0.0.1:8000"
 SAMPLES = Path(__file__).parents[2] / "sample_runs"
+PATIENCE = 120.0
+"""How long a job may take, s."""
 
 
 def open_client(settings: Settings, **options) -> TestClient:
@@ -50,6 +54,22 @@ class Visitor:
 
     def upload(self, data: bytes, name: str = "run.csv"):
         return self.post("/measurements", files={"file": (name, data)})
+
+    def submit(self, jobs: str, asked: Mapping[str, Any]) -> dict[str, Any]:
+        """A job of a kind, such as "sweeps", that the service has taken."""
+        reply = self.post(f"/{jobs}", json=asked)
+        assert reply.status_code == 202, reply.text
+        return reply.json()
+
+    def wait_for(self, jobs: str, job: str, *states: str) -> dict[str, Any]:
+        """A job in one of these states, or at its end."""
+        deadline = time.monotonic() + PATIENCE
+        while True:
+            kept = self.get(f"/{jobs}/{job}").json()
+            if kept["state"] in (*states, "done", "failed", "cancelled"):
+                return kept
+            assert time.monotonic() < deadline, kept
+            time.sleep(0.05)
 
 
 @pytest.fixture

@@ -19,10 +19,9 @@ from ridetune.engine.plant import ConceptPlant
 from ridetune.engine.sensor_file import noisy
 from ridetune.engine.vehicle_file import reference_vehicles, vehicle_to_json
 
-from .conftest import Visitor, open_client
+from .conftest import PATIENCE, Visitor, open_client
 from .test_jobs import StandIn
 
-PATIENCE = 120.0
 CAR = reference_vehicles()["paper"]
 PAPER = vehicle_to_json(CAR)
 NOISE = {"chassis.z": 1e-3, "wheel.fl.z": 2e-4}
@@ -38,25 +37,13 @@ def engineer(tmp_path_factory):
 
 
 def submit(visitor: Visitor, **asked) -> dict:
-    reply = visitor.post("/campaigns", json={**SHORT, **asked})
-    assert reply.status_code == 202, reply.text
-    return reply.json()
-
-
-def wait_for(visitor: Visitor, job: str, *states: str) -> dict:
-    deadline = time.monotonic() + PATIENCE
-    while True:
-        kept = visitor.get(f"/campaigns/{job}").json()
-        if kept["state"] in states:
-            return kept
-        assert time.monotonic() < deadline, kept
-        time.sleep(0.05)
+    return visitor.submit("campaigns", {**SHORT, **asked})
 
 
 @pytest.fixture(scope="module")
 def done(engineer) -> dict:
     """A campaign that is done."""
-    ended = wait_for(engineer, submit(engineer)["id"], "done", "failed")
+    ended = engineer.wait_for("campaigns", submit(engineer)["id"])
     assert ended["state"] == "done", ended["error"]
     return ended
 
@@ -85,7 +72,7 @@ def test_the_recordings_are_those_of_the_engine(engineer, done):
 def test_the_random_roads_are_those_that_are_asked_for(engineer, done):
     """Oracle: the engine called directly. The bump is no random road."""
     told = {"class_factor": 0.5, "band": [0.05, 2.0], "road_seed": 9}
-    ended = wait_for(engineer, submit(engineer, **told)["id"], "done", "failed")
+    ended = engineer.wait_for("campaigns", submit(engineer, **told)["id"])
     expected = by_engine(class_factor=0.5, band=(0.05, 2.0), seed=9)
     for name, recording in expected.items():
         assert text(engineer, ended, f"{name}.csv") == recording
@@ -99,7 +86,7 @@ def test_what_a_campaign_shows_repeats_it(engineer, done):
     fields = ("plant", "vehicle", "manoeuvres", "class_factor", "band", "road_seed")
     fields += ("noise", "sensors", "seed", "format")
     again = submit(engineer, **{name: done[name] for name in fields})
-    again = wait_for(engineer, again["id"], "done", "failed")
+    again = engineer.wait_for("campaigns", again["id"])
     assert again["result"]["recordings"] == done["result"]["recordings"]
 
 
@@ -163,14 +150,14 @@ def test_recordings_that_do_not_all_fit_are_not_taken_over(tmp_path):
     limits = Limits(session_measurements=3)
     with open_client(Settings(data=tmp_path, limits=limits)) as client:
         visitor = Visitor(client)
-        job = wait_for(visitor, submit(visitor)["id"], "done", "failed")
+        job = visitor.wait_for("campaigns", submit(visitor)["id"])
         refused = visitor.post(f"/campaigns/{job['id']}/measurements")
         assert (refused.status_code, "delete one first" in refused.text) == (429, True)
         assert len(visitor.get("/measurements").json()) == 2
 
 
 def test_mdf4_comes_as_a_file_but_is_not_read_back(engineer):
-    job = wait_for(engineer, submit(engineer, format="mf4")["id"], "done", "failed")
+    job = engineer.wait_for("campaigns", submit(engineer, format="mf4")["id"])
     file = engineer.get(f"/campaigns/{job['id']}/files/manoeuvre_bump.mf4")
     assert file.content.startswith(b"MDF     4.1")
     refused = engineer.post(f"/campaigns/{job['id']}/measurements")
@@ -184,7 +171,7 @@ def test_own_manoeuvres_and_sensors(engineer):
         "noise": {},
         "sensors": {"rate_hz": 100, "sensors": {"chassis.z": {"noise": 1e-3}}},
     }
-    job = wait_for(engineer, submit(engineer, **asked)["id"], "done", "failed")
+    job = engineer.wait_for("campaigns", submit(engineer, **asked)["id"])
     assert [one["file"] for one in job["result"]["recordings"]] == [
         "manoeuvre_mine.csv",
         "manoeuvre_known.csv",
@@ -211,7 +198,7 @@ def test_a_running_campaign_has_no_files_until_it_is_cancelled(engineer):
     """Thirty drives of 20 s take seconds."""
     long = {f"drive-{k}": "1" for k in range(30)}
     job = submit(engineer, manoeuvres=long)["id"]
-    wait_for(engineer, job, "running")
+    engineer.wait_for("campaigns", job, "running")
     early = engineer.get(f"/campaigns/{job}/files")
     assert (early.status_code, "wait until it has ended" in early.text) == (409, True)
     deadline = time.monotonic() + PATIENCE
@@ -219,7 +206,7 @@ def test_a_running_campaign_has_no_files_until_it_is_cancelled(engineer):
         assert time.monotonic() < deadline
         time.sleep(0.02)
     assert engineer.post(f"/campaigns/{job}/cancel").status_code == 202
-    ended = wait_for(engineer, job, "cancelled", "done", "failed")
+    ended = engineer.wait_for("campaigns", job)
     assert ended["state"] == "cancelled", ended["error"]
     states = [one["state"] for one in ended["result"]["recordings"]]
     whole = states.count("whole")
@@ -297,7 +284,7 @@ def test_a_drive_that_diverges_is_kept_as_far_as_it_came(engineer):
     """A tyre a hundred times too stiff for the step."""
     car = json.loads(json.dumps(PAPER))
     car["front"]["tyre"]["stiffness"] = car["rear"]["tyre"]["stiffness"] = 4e7
-    job = wait_for(engineer, submit(engineer, vehicle=car)["id"], "done", "failed")
+    job = engineer.wait_for("campaigns", submit(engineer, vehicle=car)["id"])
     for one in job["result"]["recordings"]:
         assert one["state"] != "whole"
         assert one["failure"].endswith(".")
@@ -349,7 +336,7 @@ def test_the_detailed_car_tells_how_far_it_is_and_stops_in_the_midst_of_a_drive(
         assert time.monotonic() < deadline, told
         told.add(engineer.get(f"/campaigns/{job['id']}").json()["progress"].get("driven", 0.0))
     engineer.post(f"/campaigns/{job['id']}/cancel")
-    ended = wait_for(engineer, job["id"], "cancelled", "done", "failed")
+    ended = engineer.wait_for("campaigns", job["id"])
     assert max(told) < 60.0
     assert ended["progress"]["runs"] == 1
     whole, missing = ended["result"]["recordings"]

@@ -3,7 +3,6 @@
 import json
 import os
 import signal
-import time
 
 import httpx2
 import psutil
@@ -16,7 +15,6 @@ from ridetune.engine.vehicle_file import read_vehicle, vehicle_to_json
 from .conftest import SAMPLES, Visitor, open_client
 from .live import LiveService
 
-PATIENCE = 120.0
 REAR = "rear.suspension.stiffness"
 
 
@@ -25,16 +23,6 @@ def engineer(tmp_path_factory):
     """A session on a service with workers of its own."""
     with open_client(Settings(data=tmp_path_factory.mktemp("fits"))) as client:
         yield Visitor(client)
-
-
-def wait_for(visitor: Visitor, job: str, *states: str) -> dict:
-    deadline = time.monotonic() + PATIENCE
-    while True:
-        kept = visitor.get(f"/identifications/{job}").json()
-        if kept["state"] in states:
-            return kept
-        assert time.monotonic() < deadline, kept
-        time.sleep(0.05)
 
 
 def test_two_parameters_come_back_from_the_twins_recording(engineer):
@@ -54,7 +42,7 @@ def test_two_parameters_come_back_from_the_twins_recording(engineer):
     events = engineer.get(f"/identifications/{job['id']}/events").text
     assert events.startswith("event: state")
     assert "event: progress" in events
-    ended = wait_for(engineer, job["id"], "done", "failed")
+    ended = engineer.wait_for("identifications", job["id"])
     assert ended["state"] == "done", ended["error"]
     assert ended["progress"]["cost"] == ended["progress"]["cost_history"][-1]
     for found in ended["result"]["parameters"]:
@@ -79,7 +67,7 @@ def test_marked_braking_and_settings_are_used_and_kept(engineer):
     beyond = engineer.post("/identifications", json={**asked, "braking": {run: [[50, 60]]}})
     assert (beyond.status_code, "mark a time in it" in beyond.text) == (422, True)
     job = engineer.post("/identifications", json=asked).json()["id"]
-    result = wait_for(engineer, job, "done", "failed")["result"]
+    result = engineer.wait_for("identifications", job)["result"]
     assert result["settings"]["rim_cutoff_hz"] == 40.0
     assert result["settings"]["a_x_cutoff_hz"] == 20.0
     assert result["runs"][0]["braking"] == [[12.0, 15.0]]
@@ -99,7 +87,7 @@ def test_what_a_job_shows_repeats_its_fit(engineer):
         "braking": {run: []},
     }
     first = engineer.post("/identifications", json=asked).json()["id"]
-    first = wait_for(engineer, first, "done", "failed")
+    first = engineer.wait_for("identifications", first)
     assert engineer.get("/identifications").json()[-1].keys() == first.keys() - {
         "vehicle",
         "result",
@@ -110,7 +98,7 @@ def test_what_a_job_shows_repeats_its_fit(engineer):
     again = {name: first[name] for name in IdentificationRequest.model_fields if name != "key"}
     again["runs"] = [run["id"] for run in first["runs"]]
     again = engineer.post("/identifications", json=again).json()["id"]
-    again = wait_for(engineer, again, "done", "failed")
+    again = engineer.wait_for("identifications", again)
     differ = {name for name in first["result"] if first["result"][name] != again["result"][name]}
     assert differ <= {"seconds"}
     assert first["free"] == again["free"] == [REAR, "front.pivot.angle"]
@@ -133,9 +121,9 @@ def test_a_start_too_stiff_for_the_step_is_refused_with_one_that_it_takes(engine
 def test_a_running_identification_is_cancelled(engineer):
     runs = [kept["id"] for kept in engineer.get("/measurements").json()][:2]
     job = engineer.post("/identifications", json={"runs": runs}).json()["id"]
-    wait_for(engineer, job, "running")
+    engineer.wait_for("identifications", job, "running")
     assert engineer.post(f"/identifications/{job}/cancel").status_code == 202
-    ended = wait_for(engineer, job, "cancelled", "done", "failed")
+    ended = engineer.wait_for("identifications", job)
     assert (ended["state"], ended["error"], ended["result"]) == ("cancelled", None, None)
 
 
@@ -147,7 +135,7 @@ def test_after_a_kill_nothing_is_left_behind_and_nothing_is_lost(tmp_path):
         run = visitor.upload(recording, "twin.csv").json()["id"]
         asked = {"runs": [run], "free": ["front.suspension.stiffness"]}
         job = visitor.post("/identifications", json=asked).json()["id"]
-        wait_for(visitor, job, "running", "done")
+        visitor.wait_for("identifications", job, "running")
         family = psutil.Process(service.process.pid).children(recursive=True)
         assert family
         service.kill()
@@ -156,7 +144,7 @@ def test_after_a_kill_nothing_is_left_behind_and_nothing_is_lost(tmp_path):
     with LiveService(tmp_path) as service:
         visitor.client = service.client
         assert visitor.get(f"/measurements/{run}/original").content == recording
-        ended = wait_for(visitor, job, "done", "failed")
+        ended = visitor.wait_for("identifications", job)
         assert ended["state"] == "done", ended["error"]
         assert ended["result"]["parameters"][0]["name"] == "front.suspension.stiffness"
 

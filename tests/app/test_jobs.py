@@ -76,9 +76,7 @@ def owner(service) -> Visitor:
 
 def submit(owner: Visitor, **more) -> dict:
     runs = [kept["id"] for kept in owner.get("/measurements").json()][:1]
-    reply = owner.post("/identifications", json={"runs": runs, **more})
-    assert reply.status_code == 202, reply.text
-    return reply.json()
+    return owner.submit("identifications", {"runs": runs, **more})
 
 
 def until(condition: Callable[[], object], patience: float = PATIENCE) -> None:

@@ -2,7 +2,6 @@
 
 import io
 import json
-import time
 
 import numpy as np
 import pytest
@@ -23,7 +22,6 @@ from .conftest import Visitor, open_client
 from .live import LiveService
 from .test_jobs import StandIn, until
 
-PATIENCE = 120.0
 COMPILING = 240.0
 """How long a service may take to be ready to simulate where nothing is compiled yet, s."""
 RANGES = {"K_F": [1e4, 4e4], "chassis.mass": [900.0, 1300.0]}
@@ -40,25 +38,13 @@ def engineer(tmp_path_factory):
 
 
 def submit(visitor: Visitor, **asked) -> dict:
-    reply = visitor.post("/sweeps", json={"design": BOX, **BUMP, **asked})
-    assert reply.status_code == 202, reply.text
-    return reply.json()
-
-
-def wait_for(visitor: Visitor, job: str, *states: str) -> dict:
-    deadline = time.monotonic() + PATIENCE
-    while True:
-        kept = visitor.get(f"/sweeps/{job}").json()
-        if kept["state"] in states:
-            return kept
-        assert time.monotonic() < deadline, kept
-        time.sleep(0.05)
+    return visitor.submit("sweeps", {"design": BOX, **BUMP, **asked})
 
 
 @pytest.fixture(scope="module")
 def done(engineer) -> dict:
     """A sweep that is done."""
-    return wait_for(engineer, submit(engineer)["id"], "done", "failed")
+    return engineer.wait_for("sweeps", submit(engineer)["id"])
 
 
 def rows(visitor: Visitor, job: dict):
@@ -125,7 +111,7 @@ def test_what_a_sweep_shows_repeats_it(engineer, done):
     """Oracle: the rows of the first. The session's car has changed in between."""
     assert engineer.put("/vehicle", json={**PAPER, "name": "another"}).status_code == 200
     again = {name: done[name] for name in SweepRequest.model_fields if name != "key"}
-    again = wait_for(engineer, submit(engineer, **again)["id"], "done", "failed")
+    again = engineer.wait_for("sweeps", submit(engineer, **again)["id"])
     assert_same(rows(engineer, again), rows(engineer, done))
 
 
@@ -143,14 +129,14 @@ def test_a_recording_moves_the_cars_and_stays_while_it_does(engineer, mode):
     levels = {"K_F": [2e4, 2.5e4], "front.tyre.stiffness": {"low": 1e5, "high": 2e5, "count": 2}}
     job = submit(engineer, **asked, design={"kind": "full-factorial", "levels": levels})
     assert job["runs"][0]["id"] == run
-    ended = wait_for(engineer, job["id"], "done", "failed")
+    ended = engineer.wait_for("sweeps", job["id"])
     assert ended["state"] == "done", ended["error"]
     assert set(rows(engineer, ended)["status"].to_pylist()) == {OK}
 
 
 def test_failed_cars_are_counted_and_say_why(engineer):
     design = {"kind": "full-factorial", "levels": {"phi_F": [0.07, 1.48]}}
-    ended = wait_for(engineer, submit(engineer, design=design)["id"], "done", "failed")
+    ended = engineer.wait_for("sweeps", submit(engineer, design=design)["id"])
     assert (ended["result"]["cars"], ended["result"]["failed"]) == (2, 1)
     table = rows(engineer, ended)
     assert table["status"].to_pylist()[1].startswith("Front.pivot lies")
@@ -159,11 +145,11 @@ def test_failed_cars_are_counted_and_say_why(engineer):
 
 def test_a_running_sweep_is_cancelled_and_has_no_rows(engineer):
     job = submit(engineer, design={**BOX, "cars": 20_000})["id"]
-    wait_for(engineer, job, "running")
+    engineer.wait_for("sweeps", job, "running")
     early = engineer.get(f"/sweeps/{job}/cars.parquet")
     assert (early.status_code, "wait until it is done" in early.text) == (409, True)
     assert engineer.post(f"/sweeps/{job}/cancel").status_code == 202
-    ended = wait_for(engineer, job, "cancelled", "done", "failed")
+    ended = engineer.wait_for("sweeps", job)
     assert (ended["state"], ended["error"], ended["result"]) == ("cancelled", None, None)
     refused = engineer.get(f"/sweeps/{job}/cars.csv")
     assert (refused.status_code, "ask for it again" in refused.text) == (409, True)
@@ -183,7 +169,7 @@ def test_sweeps_and_identifications_are_kept_apart(engineer, done):
 
 
 def test_a_deleted_sweep_takes_its_file_along(engineer):
-    job = wait_for(engineer, submit(engineer, design={**BOX, "cars": 2})["id"], "done", "failed")
+    job = engineer.wait_for("sweeps", submit(engineer, design={**BOX, "cars": 2})["id"])
     store = engineer.client.app.state.services.store
     file = store.directory.original(store.jobs.get(engineer.id, job["id"]).file)
     assert file.exists()
@@ -301,11 +287,11 @@ def test_a_sweep_outlives_a_kill_of_the_service_and_so_do_its_rows(tmp_path):
         visitor = Visitor(service.client)
         until(lambda: service.client.get("/readyz").status_code == 200, patience=COMPILING)
         job = submit(visitor, design={**BOX, "cars": 60})["id"]
-        wait_for(visitor, job, "running", "done")
+        visitor.wait_for("sweeps", job, "running")
         service.kill()
     with LiveService(tmp_path) as service:
         visitor.client = service.client
-        ended = wait_for(visitor, job, "done", "failed")
+        ended = visitor.wait_for("sweeps", job)
         assert ended["state"] == "done", ended["error"]
         first = rows(visitor, ended)
         service.kill()

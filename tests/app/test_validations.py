@@ -1,7 +1,6 @@
 """Validations over REST: from a finished identification to the report, by real workers."""
 
 import json
-import time
 
 import pytest
 from ridetune.app.settings import Settings
@@ -10,7 +9,6 @@ from ridetune.engine.vehicle_file import reference_vehicles, vehicle_to_json
 
 from .conftest import SAMPLES, Visitor, open_client
 
-PATIENCE = 120.0
 PAPER = vehicle_to_json(reference_vehicles()["paper"])
 
 
@@ -19,16 +17,6 @@ def engineer(tmp_path_factory):
     """A session on a service with workers of its own."""
     with open_client(Settings(data=tmp_path_factory.mktemp("validations"))) as client:
         yield Visitor(client)
-
-
-def ended(visitor: Visitor, path: str) -> dict:
-    deadline = time.monotonic() + PATIENCE
-    while True:
-        job = visitor.get(path).json()
-        if job["state"] in ("done", "failed", "cancelled"):
-            return job
-        assert time.monotonic() < deadline, job
-        time.sleep(0.05)
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +31,7 @@ def fitted(engineer, runs) -> str:
     """A fit of the springs to the first run; all else is the twin's own."""
     asked = {"runs": runs[:1], "vehicle": PAPER, "free": ["K_F", "K_R"]}
     job = engineer.post("/identifications", json=asked).json()
-    done = ended(engineer, f"/identifications/{job['id']}")
+    done = engineer.wait_for("identifications", job["id"])
     assert done["state"] == "done", done["error"]
     return job["id"]
 
@@ -54,7 +42,7 @@ def done(engineer, runs, fitted) -> dict:
     asked = {"identification": fitted, "hold_out": runs[1:], "manoeuvres": {runs[1]: "2"}}
     reply = engineer.post("/validations", json=asked)
     assert reply.status_code == 202, reply.text
-    return ended(engineer, f"/validations/{reply.json()['id']}")
+    return engineer.wait_for("validations", reply.json()["id"])
 
 
 def test_the_held_out_run_is_predicted_to_its_noise(engineer, runs, done):
@@ -120,7 +108,7 @@ def test_a_cancelled_validation_has_no_report(engineer, runs, fitted):
     asked = {"identification": fitted, "hold_out": runs[1:]}
     job = engineer.post("/validations", json=asked).json()["id"]
     engineer.post(f"/validations/{job}/cancel")
-    state = ended(engineer, f"/validations/{job}")["state"]
+    state = engineer.wait_for("validations", job)["state"]
     reply = engineer.get(f"/validations/{job}/report.html")
     assert reply.status_code == (200 if state == "done" else 409)
     assert engineer.delete(f"/validations/{job}").status_code == 204
