@@ -5,10 +5,11 @@ service to start; they are imported when they are first asked for.
 """
 
 from dataclasses import asdict
-from typing import Any, get_args
+from typing import Annotated, Any, get_args
 
 import numpy as np
-from fastapi import APIRouter
+from fastapi import APIRouter, Depends
+from starlette.concurrency import run_in_threadpool
 
 from ..engine.channels import CHANNELS
 from ..engine.errors import ParameterError
@@ -26,9 +27,13 @@ from ..engine.vehicle_file import reference_vehicles, vehicle_to_json
 from .errors import NotFound
 from .plants import PLANTS
 from .schemas import RimsSettingsForm, RoadPreview, StartValues
+from .services import Shared
 from .strict_json import StrictRoute
+from .uploads import Upload, openapi, receive
 
 router = APIRouter(prefix="/api", tags=["catalogue"], route_class=StrictRoute)
+
+Sensors = Annotated[Upload, Depends(receive("sensors.toml"))]
 
 
 @router.get("/parameters")
@@ -135,6 +140,36 @@ def plants() -> list[dict[str, Any]]:
         {"key": key, **{field: getattr(one, field) for field in shown}, "missing": one.missing()}
         for key, one in PLANTS.items()
     ]
+
+
+@router.get("/formats")
+def formats() -> list[dict[str, str]]:
+    """The forms of a campaign's recordings; missing : why one cannot be written here, else ""."""
+    from ..engine.mdf4 import missing_asammdf
+
+    return [
+        {"key": "csv", "name": "CSV", "missing": ""},
+        {"key": "mf4", "name": "MDF4", "missing": missing_asammdf()},
+    ]
+
+
+@router.post("/sensors", openapi_extra=openapi("application/toml"))
+async def sensors(services: Shared, received: Sensors) -> dict[str, Any]:
+    """A file of sensors, TOML or JSON, checked: `sensors` as a campaign takes them, the channels
+    that they record, and the samples a second.
+    """
+    async with services.parsing:
+        return await run_in_threadpool(
+            _sensors, received.read(services.settings.limits.body_bytes), received.name
+        )
+
+
+def _sensors(data: bytes, name: str) -> dict[str, Any]:
+    from ..engine.sensor_file import content_of, sensors_from_json
+
+    content = content_of(data, name)
+    found = sensors_from_json(content, name)
+    return {"sensors": content, "channels": list(found.sensors), "rate_hz": found.rate_hz}
 
 
 @router.get("/roads")

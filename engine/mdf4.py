@@ -10,12 +10,17 @@ from .errors import MeasurementError
 from .units import to_si
 
 
+def missing_asammdf() -> str:
+    """What to do where MDF4 cannot be written for want of a package, a sentence; else empty."""
+    if find_spec("asammdf") is not None:
+        return ""
+    return "MDF4 needs asammdf, which is not installed; install ridetune[mdf], or take CSV."
+
+
 def require_asammdf() -> None:
-    """Raise MeasurementError where MDF4 cannot be written for want of a package."""
-    if find_spec("asammdf") is None:
-        raise MeasurementError(
-            "MDF4 needs asammdf, which is not installed; install ridetune[mdf], or take CSV."
-        )
+    """Raise MeasurementError where MDF4 cannot be written."""
+    if said := missing_asammdf():
+        raise MeasurementError(said)
 
 
 def run_to_mdf4(

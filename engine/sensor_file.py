@@ -36,6 +36,8 @@ from .vehicle import Range
 
 KEYS = ("rate_hz", "points", "sensors")
 MOST_CHANNELS = 200
+DEEPEST = 8
+"""Tables in one another that the name of a channel may be written as."""
 
 Rate = Annotated[float, Range("Hz", 1.0, 1e5)]
 Position = tuple[
@@ -66,16 +68,20 @@ def read_sensors(path: Path) -> SensorSet:
         raise MeasurementError(
             f"{path}: cannot be read ({error.strerror}); check the path."
         ) from error
+    return sensors_from_json(content_of(data, path.name), path.name)
+
+
+def content_of(data: bytes, source: str) -> Any:
+    """What a file says, TOML or JSON, as parsed and not looked at; MeasurementError names it."""
     if len(data) > LARGEST_FILE:
-        raise MeasurementError(f"{path.name}: larger than 1 MB; a file of sensors is short.")
+        raise MeasurementError(f"{source}: larger than 1 MB; a file of sensors is short.")
     try:
         text = data.decode("utf-8-sig").replace("\r\n", "\n")
-        content = json.loads(text) if text.lstrip().startswith("{") else tomllib.loads(text)
+        return json.loads(text) if text.lstrip().startswith("{") else tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise MeasurementError(
-            f"{path.name}: neither valid TOML nor JSON ({error}); correct it."
+            f"{source}: neither valid TOML nor JSON ({error}); correct it."
         ) from error
-    return sensors_from_json(content, path.name)
 
 
 def sensors_from_json(data: Any, source: str = "sensors") -> SensorSet:
@@ -158,6 +164,8 @@ def _leaves(reader: RecordReader, table: Any, path: str) -> dict[str, Any]:
     """By dotted name, what lies in a table whose names may be written without quotes."""
     if not isinstance(table, Mapping):
         raise reader.refuse(path, f"must be a table, not {describe(table)}.")
+    if path.count(".") > DEEPEST:
+        raise reader.refuse(path, "is nested deeper than any channel's name has dots; correct it.")
     found: dict[str, Any] = {}
     for name, value in table.items():
         nested = isinstance(value, Mapping) and any(isinstance(v, Mapping) for v in value.values())

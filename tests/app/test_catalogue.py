@@ -1,6 +1,8 @@
 """What comes with the service: tables, cars, manoeuvres, roads, and the description of it all."""
 
+import json
 import math
+import tomllib
 
 import pytest
 from ridetune.engine.channels import CHANNELS
@@ -8,6 +10,7 @@ from ridetune.engine.manoeuvre import manoeuvre_from_json, reference_manoeuvres
 from ridetune.engine.parameters import ALL_NAMES
 from ridetune.engine.rims_settings import RimsSettings
 from ridetune.engine.run_notes import DEFAULT_NOISE
+from ridetune.engine.sensor_file import sensors_from_json
 from ridetune.engine.vehicle_file import reference_vehicles, vehicle_from_json
 
 
@@ -111,6 +114,50 @@ def test_a_road_that_cannot_be_built_is_refused(client, asked, said):
     reply = client.post("/api/roads/preview", json=asked)
     assert reply.status_code == 422
     assert said in reply.json()["detail"]
+
+
+TOML = b"""rate_hz = 100
+[sensors."wheel.{corner}.z"]
+noise = 0.5
+unit = "mm"
+[sensors.chassis.z]
+"""
+
+
+def test_a_file_of_sensors_is_read_for_a_campaign(visitor):
+    """Oracle: the engine's reading of the file. What is answered is what a campaign takes."""
+    expected = sensors_from_json(tomllib.loads(TOML.decode()))
+    read = visitor.client.post("/api/sensors?name=s.toml", content=TOML).json()
+    assert read["channels"] == list(expected.sensors)
+    assert read["rate_hz"] == 100.0
+    assert sensors_from_json(read["sensors"]) == expected
+    data = json.dumps(read["sensors"]).encode()
+    again = visitor.client.post("/api/sensors", files={"file": ("s.json", data)})
+    assert again.json() == read
+    taken = visitor.submit("campaigns", {"manoeuvres": ["bump"], "sensors": read["sensors"]})
+    assert taken["sensors"] == read["sensors"]
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (b"[sensors", "s.toml: neither valid TOML nor JSON"),
+        (b'[sensors."chassis.zz"]', "s.toml: sensors.chassis.zz is not known"),
+        (b"rate_hz = nan", "s.toml: rate_hz is nan, but must lie"),
+        (b"#" * 1_000_001, "s.toml: larger than 1 MB"),
+    ],
+)
+def test_a_file_of_sensors_that_cannot_be_used_is_refused(client, data, said):
+    reply = client.post("/api/sensors", files={"file": ("s.toml", data)})
+    assert (reply.status_code, reply.json()["code"]) == (422, "measurement")
+    assert reply.json()["detail"].startswith(said)
+
+
+def test_the_formats_of_recordings_are_listed(client, monkeypatch):
+    listed = client.get("/api/formats").json()
+    assert [(one["key"], one["missing"]) for one in listed] == [("csv", ""), ("mf4", "")]
+    monkeypatch.setattr("ridetune.engine.mdf4.find_spec", lambda name: None)
+    assert client.get("/api/formats").json()[1]["missing"].endswith("or take CSV.")
 
 
 def test_the_interface_describes_itself(client):

@@ -120,10 +120,15 @@ def test_a_delay_as_long_as_the_run_is_refused():
         check(data, duration=6.0)
 
 
-def test_a_file_that_is_neither_toml_nor_json_or_not_there_is_refused(tmp_path):
+def test_a_file_that_cannot_be_read_is_refused(tmp_path):
     path = tmp_path / "s.toml"
     path.write_text("rate_hz = ")
     with pytest.raises(MeasurementError, match=r"s\.toml: neither valid TOML nor JSON"):
+        read_sensors(path)
+    path.write_text("[sensors]\n" + "a." * 5000 + "b = {}")
+    with pytest.raises(
+        MeasurementError, match=r"s\.toml: sensors\.a\.\S+ is nested deeper than any"
+    ):
         read_sensors(path)
     with pytest.raises(MeasurementError, match=r"gone\.toml: cannot be read \(No such file"):
         read_sensors(tmp_path / "gone.toml")
