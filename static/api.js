@@ -133,36 +133,13 @@ export function measurement(id, channelNames, maxSamples, decimate = "stride") {
   return frames("GET", `${base}/measurements/${id}/frames?${query}`, { accept: FRAMES });
 }
 
-// Identifications
-export const identify = (body) => json("POST", `${base}/identifications`, { body });
-export const identification = (id) => json("GET", `${base}/identifications/${id}`);
-export const cancelIdentification = (id) =>
-  json("POST", `${base}/identifications/${id}/cancel`);
+// Jobs of a kind: "identifications", "validations" or "campaigns"
+export const submit = (kind, body) => json("POST", `${base}/${kind}`, { body });
+export const jobs = (kind) => json("GET", `${base}/${kind}`);
+export const job = (kind, id) => json("GET", `${base}/${kind}/${id}`);
+export const cancelJob = (kind, id) => json("POST", `${base}/${kind}/${id}/cancel`);
 
-// Validations
-export const validate = (body) => json("POST", `${base}/validations`, { body });
-export const validation = (id) => json("GET", `${base}/validations/${id}`);
-export const validations = () => json("GET", `${base}/validations`);
-export const cancelValidation = (id) => json("POST", `${base}/validations/${id}/cancel`);
-/** What the report shows, as JSON. */
-export const validationDocument = (id) => json("GET", `${base}/validations/${id}/result.json`);
-export const reportUrl = (id) => `${base}/validations/${id}/report.html`;
-
-// Campaigns
-export const driveCampaign = (body) => json("POST", `${base}/campaigns`, { body });
-export const campaign = (id) => json("GET", `${base}/campaigns/${id}`);
-export const campaigns = () => json("GET", `${base}/campaigns`);
-export const cancelCampaign = (id) => json("POST", `${base}/campaigns/${id}/cancel`);
-/** The whole recordings as measurements of the session. */
-export const takeOver = (id) => json("POST", `${base}/campaigns/${id}/measurements`);
-export const campaignUrl = (id) => `${base}/campaigns/${id}/campaign.zip`;
-export const campaignFileUrl = (id, name) =>
-  `${base}/campaigns/${id}/files/${encodeURIComponent(name)}`;
-
-/**
- * Follow a job of a kind ("identifications", "validations", "campaigns"): onProgress(progress), onState(job).
- * Returns a function that stops following.
- */
+/** Follow a job: onProgress(progress), onState(job). Returns a function that stops following. */
 export function follow(kind, id, onProgress, onState) {
   const source = new EventSource(`${base}/${kind}/${id}/events`);
   source.addEventListener("progress", (event) => onProgress(JSON.parse(event.data)));
@@ -176,9 +153,9 @@ export function follow(kind, id, onProgress, onState) {
     if (source.readyState !== EventSource.CLOSED) return;
     setTimeout(async () => {
       try {
-        const job = await json("GET", `${base}/${kind}/${id}`);
-        onState(job);
-        if (!isFinal(job.state)) stop = follow(kind, id, onProgress, onState);
+        const found = await job(kind, id);
+        onState(found);
+        if (!isFinal(found.state)) stop = follow(kind, id, onProgress, onState);
       } catch (error) {
         if (error.lost) source.dispatchEvent(new Event("error"));
       }
@@ -189,3 +166,13 @@ export function follow(kind, id, onProgress, onState) {
 }
 
 export const isFinal = (state) => ["done", "failed", "cancelled"].includes(state);
+
+// What a validation and a campaign have besides
+/** What the report shows, as JSON. */
+export const validationDocument = (id) => json("GET", `${base}/validations/${id}/result.json`);
+export const reportUrl = (id) => `${base}/validations/${id}/report.html`;
+/** The whole recordings as measurements of the session. */
+export const takeOver = (id) => json("POST", `${base}/campaigns/${id}/measurements`);
+export const campaignUrl = (id) => `${base}/campaigns/${id}/campaign.zip`;
+export const campaignFileUrl = (id, name) =>
+  `${base}/campaigns/${id}/files/${encodeURIComponent(name)}`;

@@ -3,6 +3,7 @@
 import * as api from "./api.js";
 import { withValues } from "./controls.js";
 import { fold, h, inPlace } from "./dom.js";
+import { jobs } from "./job.js";
 import { notice, refused } from "./notices.js";
 import { get, on, set } from "./store.js";
 import * as units from "./units.js";
@@ -17,15 +18,12 @@ const memory = { open: false };
 const fields = {};
 const parts = {};
 
-let job = null;
 /** What was wrong with the last request, a sentence. */
 let problem = "";
-let starting = false;
-let unfollow = () => {};
+const { now: current, busy, start: send, resume: takeUp, cancel } =
+  jobs("campaigns", "campaign", { changed: show, ended });
 
-export const current = () => job;
-
-const busy = () => job !== null && !api.isFinal(job.state);
+export { current };
 
 /** The form, folded, with what became of the newest campaign below it. */
 export function build() {
@@ -50,7 +48,6 @@ export function build() {
   parts.noise, parts.tools);
   fields.noise.addEventListener("change", () => { parts.noise.textContent = noiseSaid(); });
   parts.noise.textContent = noiseSaid();
-  on("online", ({ online }) => { if (online && busy()) watch(job.id); });
   on("measurements", show);
   show();
   return fold(memory, h("summary", {}, "Drive a campaign with virtual sensors"),
@@ -101,56 +98,25 @@ function request() {
   };
 }
 
-async function start() {
-  if (starting || busy()) return;
-  starting = true;
+function start() {
   problem = "";
-  try {
-    job = await api.driveCampaign(request());
-    watch(job.id);
-  } catch (error) {
-    if (error.lost) set({ online: false });
-    else if (error.code === undefined) throw error;
-    else problem = error.message;
-  } finally {
-    starting = false;
-  }
-  show();
+  send(request, (error) => {
+    if (error.code === undefined) throw error;
+    if (!error.lost) problem = error.message;
+  });
 }
 
 /** Take up the newest campaign of a session that is opened again. */
 export async function resume() {
-  const [newest] = (await api.campaigns()).sort((a, b) => (a.created < b.created ? 1 : -1));
-  if (!newest) return;
-  job = await api.campaign(newest.id);
-  if (busy()) watch(job.id);
+  await takeUp();
   show();
 }
 
-function watch(id) {
-  unfollow();
-  unfollow = api.follow("campaigns", id, (progress) => {
-    if (job?.id !== id) return;
-    job.progress = progress;
-    show();
-  }, async (state) => {
-    if (job?.id !== id) return;
-    job = { ...job, ...state };
-    if (api.isFinal(state.state)) await finished(id);
-    show();
-  });
+async function ended() {
+  if (whole().length) await takeOver();
 }
 
-async function finished(id) {
-  try {
-    job = await api.campaign(id);
-    if (whole().length) await takeOver();
-  } catch (error) {
-    refused(error, "Reading the campaign");
-  }
-}
-
-const whole = () => (job?.result?.recordings ?? []).filter(({ state }) => state === "whole");
+const whole = () => (current()?.result?.recordings ?? []).filter(({ state }) => state === "whole");
 
 /** Whether a recording of the campaign is not among the measurements. */
 function absent() {
@@ -160,7 +126,7 @@ function absent() {
 
 async function takeOver() {
   try {
-    const rows = await api.takeOver(job.id);
+    const rows = await api.takeOver(current().id);
     const held = new Set(get("measurements").map(({ id }) => id));
     const added = rows.filter(({ id }) => !held.has(id));
     set({ measurements: [...get("measurements"), ...added] });
@@ -168,14 +134,6 @@ async function takeOver() {
     if (count) notice("info", `${count} ${count > 1 ? "recordings are" : "recording is"} in`, "The campaign drove them.");
   } catch (error) {
     refused(error, "Adding the recordings");
-  }
-}
-
-async function cancel() {
-  try {
-    await api.cancelCampaign(job.id);
-  } catch (error) {
-    refused(error, "Cancelling");
   }
 }
 
@@ -192,13 +150,13 @@ function show() {
 }
 
 function bar() {
-  const { driven = 0, duration = 1 } = job.progress ?? {};
+  const { driven = 0, duration = 1 } = current().progress ?? {};
   return h("progress", { max: duration, value: driven, "aria-label": "Seconds driven" });
 }
 
 function progress() {
-  const { runs, of, driven, duration } = job.progress ?? {};
-  if (job.state === "queued" || of === undefined) return "Waiting for a worker …";
+  const { runs, of, driven, duration } = current().progress ?? {};
+  if (current().state === "queued" || of === undefined) return "Waiting for a worker …";
   return `${runs} of ${of} drives, ${units.fixed(driven, 1)} of ${units.plain(duration, 4)} s`;
 }
 
@@ -211,6 +169,7 @@ function extent(keys) {
 
 /** What became of the newest campaign. */
 function outcome() {
+  const job = current();
   const alarm = (text) => h("div", { className: "problem", role: "alert" }, h("p", {}, text));
   if (problem) return [alarm(problem)];
   if (job?.error) return [alarm(job.error.detail)];

@@ -4,21 +4,21 @@ import * as api from "./api.js";
 import { withValues } from "./controls.js";
 import { $, h, inPlace } from "./dom.js";
 import * as free from "./free.js";
-import { notice, refused } from "./notices.js";
+import { jobs } from "./job.js";
+import { notice } from "./notices.js";
 import * as noise from "./noise.js";
 import { brakingOf, rimsOf } from "./preparation.js";
 import * as result from "./result.js";
 import * as setup from "./setup.js";
 import { get, on, set } from "./store.js";
 
-let job = null;
 let holdouts = {};
 let view = "setup";
-let starting = false;
-let unfollow = () => {};
 let hooks = {};
+const { now: current, busy, start: send, resume: takeUp, cancel } = jobs("identifications", "identification",
+  { changed: show, progressed: advance, ended });
 
-export const current = () => job;
+export { current };
 
 /** Build the panel; `open` shows its tab, `apply(values)` moves the sliders. */
 export function build(callbacks) {
@@ -34,9 +34,6 @@ export function build(callbacks) {
   });
   on("vehicle", () => { if (view === "fit") show(); });
   on("values", () => { if (view === "setup" && !$("#identification").hidden) free.askBounds(); });
-  on("online", (state) => {
-    if (state.online && job && !api.isFinal(job.state)) watch(job.id);
-  });
   show();
 }
 
@@ -45,45 +42,34 @@ export function opened() {
   if (view === "setup") show();
 }
 
-const busy = () => job !== null && !api.isFinal(job.state);
-
-/** Take up the newest job of a session that is opened again. */
-export async function resume(jobs) {
-  const newest = [...jobs].sort((a, b) => (a.created < b.created ? 1 : -1));
-  const live = newest.find(({ state }) => !api.isFinal(state));
-  const done = newest.find(({ state }) => state === "done");
-  const from = live ?? done;
-  if (!from) return;
-  job = await api.identification(from.id);
+/** Take up the newest job of a session that is opened again: one under way, else one that is done. */
+export async function resume() {
+  let done;
+  await takeUp((all) => {
+    done = all.find(({ state }) => state === "done");
+    return all.find(({ state }) => !api.isFinal(state)) ?? done;
+  });
+  const job = current();
+  if (!job) return;
   view = "fit";
-  if (done && done.id !== from.id) set({ fit: (await api.identification(done.id)).result, fitJob: done });
-  if (job.state === "done") await finished();
-  else watch(job.id);
+  if (done && done.id !== job.id) set({ fit: (await api.job("identifications", done.id)).result, fitJob: done });
+  if (!busy()) await ended();
   show();
 }
 
-/** Start a fit as set up; a second press while it is being sent starts no second one. */
-async function start() {
-  if (starting || busy()) return;
-  starting = true;
-  await submit();
-  starting = false;
-  show();
-}
-
-async function submit() {
+/** A fit as set up; null where there is nothing to fit. */
+async function request() {
   const runs = setup.fitted();
   if (!runs.length) {
     view = "setup";
     notice("error", "No run to fit", "Set at least one measured run to “fit”.");
-    return;
+    return null;
   }
-  const bounds = await free.bounds();
   const body = {
     vehicle: withValues(get("vehicle"), get("values")),
     runs: runs.map(({ id }) => id),
     free: free.names(),
-    bounds,
+    bounds: await free.bounds(),
     noise: noise.typed(),
     traction: get("traction"),
     settings: get("rimsSettings"),
@@ -91,38 +77,22 @@ async function submit() {
     key: crypto.randomUUID?.() ?? String(Math.random()).slice(2),
   };
   holdouts = Object.fromEntries(setup.heldOut().map((run) => [run.id, null]));
-  try {
-    job = await api.identify(body);
-  } catch (error) {
-    if (error.lost) set({ online: false });
-    refused(error, "Starting the identification");
-    return;
-  }
+  return body;
+}
+
+async function start() {
+  if (!await send(request)) return;
   view = "fit";
-  watch(job.id);
+  show();
 }
 
-function watch(id) {
-  unfollow();
-  unfollow = api.follow("identifications", id, (progress) => {
-    if (job?.id !== id) return;
-    job.progress = progress;
-    if (view === "fit") result.advance(job);
-  }, async (state) => {
-    if (job?.id !== id) return;
-    job = { ...job, ...state };
-    if (state.state === "done") await finished();
-    show();
-  });
+function advance() {
+  if (view === "fit") result.advance(current());
 }
 
-async function finished() {
-  try {
-    job = await api.identification(job.id);
-  } catch (error) {
-    refused(error, "Reading the fit");
-    return;
-  }
+async function ended() {
+  const job = current();
+  if (job.state !== "done") return;
   set({ fit: job.result, fitJob: job });
   show();
   await scoreHoldouts();
@@ -130,7 +100,7 @@ async function finished() {
 
 /** A run that the fit has not seen, driven by the identified car. */
 async function scoreHoldouts() {
-  const fitted = job;
+  const fitted = current();
   const used = new Set(fitted.runs.map(({ id }) => id));
   const seen = get("measurements").filter(({ id }) => used.has(id));
   const ids = Object.keys(holdouts).length ? Object.keys(holdouts)
@@ -148,15 +118,7 @@ async function scoreHoldouts() {
       holdouts = { ...holdouts, [id]: error.message };
     }
   }
-  if (job === fitted) show();
-}
-
-async function cancel() {
-  try {
-    await api.cancelIdentification(job.id);
-  } catch (error) {
-    refused(error, "Cancelling");
-  }
+  if (current() === fitted) show();
 }
 
 function show() {
@@ -173,9 +135,9 @@ function show() {
             "Cancel")
         : h("button", { type: "button", id: "start", className: "primary", on: { click: start } },
             "Identify")),
-    view === "setup" ? setup.view() : result.view(job, holdouts, hooks.apply),
+    view === "setup" ? setup.view() : result.view(current(), holdouts, hooks.apply),
   ), "#start, #cancel");
-  if (view === "fit") result.advance(job);
+  advance();
 }
 
 function step(key, text) {

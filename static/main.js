@@ -56,7 +56,7 @@ async function start() {
   build();
   follow();
   await settle();
-  await identification.resume(session.identifications);
+  await identification.resume();
   await validation.resume();
   await campaign.resume();
 }

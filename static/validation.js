@@ -2,12 +2,13 @@
 
 import * as api from "./api.js";
 import { $, h, inPlace } from "./dom.js";
+import { jobs } from "./job.js";
 import { nameOf } from "./names.js";
 import { refused } from "./notices.js";
 import * as pivots from "./pivots.js";
 import { brakingOf } from "./preparation.js";
 import { unseen } from "./setup.js";
-import { get, on, set } from "./store.js";
+import { get, on } from "./store.js";
 import { sections } from "./validation_view.js";
 import { worded } from "./wording.js";
 
@@ -18,30 +19,25 @@ const KEPT = "kept";
 const left = new Set();
 const told = {};
 
-let job = null;
+/** {id, scores} of the last one that is done, with its histories. */
 let found = null;
-let starting = false;
-let unfollow = () => {};
+const { now: current, busy, start, resume: takeUp, cancel } =
+  jobs("validations", "validation", { changed: show, ended });
 
-export const current = () => job;
+export { current };
 
 /** Build the panel. */
 export function build() {
-  on("fitJob measurements online", show);
+  on("fitJob measurements", show);
   show();
 }
 
 /** Take up the newest validation of a session that is opened again. */
 export async function resume() {
-  const [newest] = (await api.validations()).sort((a, b) => (a.created < b.created ? 1 : -1));
-  if (!newest) return;
-  job = newest;
-  if (job.state === "done") await finished();
-  else if (!api.isFinal(job.state)) watch(job.id);
+  await takeUp();
+  if (current() && !busy()) await ended();
   show();
 }
-
-const busy = () => job !== null && !api.isFinal(job.state);
 
 /** Recordings of the fit, and those that it has not seen. */
 function runs() {
@@ -50,57 +46,26 @@ function runs() {
   return { seen, others: unseen(seen) };
 }
 
-async function start() {
-  if (starting || busy() || !pivots.ready()) return;
-  starting = true;
+function request() {
   const { seen, others } = runs();
   const held = others.filter(({ id }) => !left.has(id)).map(({ id }) => id);
   const chosen = [...seen.map(({ id }) => id), ...held];
-  try {
-    job = await api.validate({
-      identification: get("fitJob").id,
-      hold_out: held,
-      manoeuvres: Object.fromEntries(chosen.filter((id) => id in told).map((id) => [id, told[id]])),
-      braking: brakingOf(held),
-      geometry: pivots.geometry(),
-    });
-    found = null;
-    watch(job.id);
-  } catch (error) {
-    if (error.lost) set({ online: false });
-    refused(error, "Starting the validation");
-  }
-  starting = false;
-  show();
+  return {
+    identification: get("fitJob").id,
+    hold_out: held,
+    manoeuvres: Object.fromEntries(chosen.filter((id) => id in told).map((id) => [id, told[id]])),
+    braking: brakingOf(held),
+    geometry: pivots.geometry(),
+  };
 }
 
-function watch(id) {
-  unfollow();
-  unfollow = api.follow("validations", id, (progress) => {
-    if (job?.id !== id) return;
-    job.progress = progress;
-    show();
-  }, async (state) => {
-    if (job?.id !== id) return;
-    job = { ...job, ...state };
-    if (state.state === "done") await finished();
-    show();
-  });
-}
-
-async function finished() {
+async function ended() {
+  if (current().state !== "done") return;
+  const { id } = current();
   try {
-    found = await api.validationDocument(job.id);
+    found = { id, scores: await api.validationDocument(id) };
   } catch (error) {
     refused(error, "Reading the validation");
-  }
-}
-
-async function cancel() {
-  try {
-    await api.cancelValidation(job.id);
-  } catch (error) {
-    refused(error, "Cancelling");
   }
 }
 
@@ -115,6 +80,8 @@ function content() {
       "No fit yet. Identify the car first; then it can be held against runs that it has not seen.")];
   }
   const { seen, others } = runs();
+  const job = current();
+  const scores = found?.id === job?.id ? found?.scores : null;
   return [
     h("ul", { className: "runs" }, seen.map((run) => runRow(run, h("span", { className: "soft" }, "fitted"))),
       others.map((run) => runRow(run, held(run)))),
@@ -122,16 +89,18 @@ function content() {
     h("div", { className: "row-tools" },
       busy() ? h("button", { type: "button", id: "cancel-validation", className: "danger", on: { click: cancel } },
         "Cancel")
-        : h("button", { type: "button", id: "validate", className: "primary", on: { click: start } }, "Validate"),
-      found ? h("a", { className: "button", id: "report", target: "_blank", rel: "noopener",
+        : h("button", { type: "button", id: "validate", className: "primary", on: { click: () => pivots.ready() && start(request) } },
+          "Validate"),
+      scores ? h("a", { className: "button", id: "report", target: "_blank", rel: "noopener",
         href: api.reportUrl(job.id) }, "Open report") : null,
       h("span", { className: "hint", id: "validation-state" }, state())),
     job?.error ? h("div", { className: "problem", role: "alert" }, h("p", {}, worded(job.error.detail))) : null,
-    ...(found ? sections(found) : []),
+    ...(scores ? sections(scores) : []),
   ];
 }
 
 function state() {
+  const job = current();
   if (!job) return "A report for print comes with it.";
   if (job.state === "running") return `${job.progress?.predictions ?? 0} of ${job.progress?.of ?? "…"} predictions`;
   return { queued: "Waiting for a worker …", cancelled: "Cancelled", failed: "Failed", done: "" }[job.state];
