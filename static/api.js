@@ -55,6 +55,13 @@ const json = async (...args) => {
   return reply.status === 204 ? null : reply.json();
 };
 
+/** A file as a form sends it. */
+function inForm(file) {
+  const form = new FormData();
+  form.append("file", file, file.name);
+  return form;
+}
+
 /** Bytes of the frames format as a run. */
 export function decode(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
@@ -93,6 +100,9 @@ export const vehicles = () => json("GET", "/api/vehicles");
 export const referenceVehicle = (key) => json("GET", `/api/vehicles/${encodeURIComponent(key)}`);
 export const manoeuvres = () => json("GET", "/api/manoeuvres");
 export const plants = () => json("GET", "/api/plants");
+export const formats = () => json("GET", "/api/formats");
+/** {sensors, channels, rate_hz} of a file of sensors, TOML or JSON. */
+export const readSensors = (file) => json("POST", "/api/sensors", { body: inForm(file) });
 export const roads = () => json("GET", "/api/roads");
 export const rimsSettings = () => json("GET", "/api/rims-settings");
 
@@ -109,11 +119,7 @@ export async function simulateFile(body) {
 }
 
 // Measurements
-export function upload(file) {
-  const form = new FormData();
-  form.append("file", file, file.name);
-  return json("POST", `${base}/measurements`, { body: form });
-}
+export const upload = (file) => json("POST", `${base}/measurements`, { body: inForm(file) });
 export const measurements = () => json("GET", `${base}/measurements`);
 export const deleteMeasurement = (id) => json("DELETE", `${base}/measurements/${id}`);
 /** Take a measurement's noise from a NAME.toml. */
@@ -121,11 +127,8 @@ export const attachNotes = (id, file) => attach(id, "notes", file);
 /** Take what was driven from a NAME.manoeuvre.json. */
 export const attachManoeuvre = (id, file) => attach(id, "manoeuvre", file);
 export const forgetManoeuvre = (id) => json("DELETE", `${base}/measurements/${id}/manoeuvre`);
-function attach(id, what, file) {
-  const form = new FormData();
-  form.append("file", file, file.name);
-  return json("PUT", `${base}/measurements/${id}/${what}`, { body: form });
-}
+const attach = (id, what, file) =>
+  json("PUT", `${base}/measurements/${id}/${what}`, { body: inForm(file) });
 export const originalUrl = (id) => `${base}/measurements/${id}/original`;
 export function measurement(id, channelNames, maxSamples, decimate = "stride") {
   const query = new URLSearchParams({ max_samples: maxSamples, decimate });
@@ -173,6 +176,8 @@ export const validationDocument = (id) => json("GET", `${base}/validations/${id}
 export const reportUrl = (id) => `${base}/validations/${id}/report.html`;
 /** The whole recordings as measurements of the session. */
 export const takeOver = (id) => json("POST", `${base}/campaigns/${id}/measurements`);
+/** What is known of the car that drove. */
+export const campaignVehicle = (id) => json("GET", campaignFileUrl(id, "vehicle.json"));
 export const campaignUrl = (id) => `${base}/campaigns/${id}/campaign.zip`;
 export const campaignFileUrl = (id, name) =>
   `${base}/campaigns/${id}/files/${encodeURIComponent(name)}`;

@@ -1,21 +1,16 @@
 // A campaign: let a car that is known drive manoeuvres, follow the job, take its recordings over.
 
 import * as api from "./api.js";
-import { withValues } from "./controls.js";
+import * as form from "./campaign_form.js";
+import { take } from "./car.js";
 import { fold, h, inPlace } from "./dom.js";
 import { jobs } from "./job.js";
 import { notice, refused } from "./notices.js";
 import { get, on, set } from "./store.js";
 import * as units from "./units.js";
 
-/** Chosen until somebody chooses: the paper's manoeuvres. */
-const USUAL = ["1", "2"];
-/** Multiples of the noise that an identification assumes where none is stated. */
-const NOISES = { usual: 1, none: 0, "5 × usual": 5 };
-const NOISY = { "chassis.z": "z", "chassis.pitch": "pitch", "chassis.roll": "roll" };
 const STATES = { whole: "whole", partial: "broke off", missing: "missing" };
 const memory = { open: false };
-const fields = {};
 const parts = {};
 
 /** What was wrong with the last request, a sentence. */
@@ -28,79 +23,15 @@ export { current };
 /** The form, folded, with what became of the newest campaign below it. */
 export function build() {
   parts.tools = h("div", { className: "row-tools" });
-  parts.noise = h("p", { className: "hint" });
   parts.outcome = h("div", { className: "campaign-outcome" });
-  parts.manoeuvres = h("fieldset", { className: "campaign-manoeuvres" }, h("legend", {}, "Manoeuvres"),
-    get("manoeuvres").filter(({ kind }) => kind === "road").map(manoeuvre));
-  const form = h("form", { className: "campaign", "aria-label": "Drive a campaign",
-    on: { submit: (event) => { event.preventDefault(); start(); } } },
-  parts.manoeuvres,
-  h("div", { className: "campaign-fields" },
-    select("plant", "Car", Object.fromEntries(get("plants").map(({ key, name }) => [key, name])),
-      "The car that drives and is measured; the concept car is the sliders'"),
-    number("class_factor", "Road class factor", { min: "0", step: "any", placeholder: "as it is" },
-      "Times the power of every random road at the mean of its class: 1 is the mean, 0.5 the lower " +
-      "limit, 2 the upper; empty: as the manoeuvre has it"),
-    select("noise", "Noise", Object.fromEntries(Object.keys(NOISES).map((key) => [key, key])),
-      "Standard deviation of white noise on z, pitch and roll"),
-    number("seed", "Seed of the noise", { min: "0", step: "1", value: "0", required: true },
-      "Another whole number draws other noise")),
-  parts.noise, parts.tools);
-  fields.noise.addEventListener("change", () => { parts.noise.textContent = noiseSaid(); });
-  parts.noise.textContent = noiseSaid();
+  const fields = form.build({ onChange: showTools, onSubmit: start, tools: parts.tools });
   on("measurements", show);
-  show();
-  return fold(memory, h("summary", {}, "Drive a campaign with virtual sensors"),
-    form, parts.outcome);
-}
-
-function manoeuvre({ key, name, duration }) {
-  const box = h("input", { type: "checkbox", value: key, checked: USUAL.includes(key), on: { change: show } });
-  return h("label", { title: name }, box, h("span", { className: "name" }, name),
-    h("span", { className: "soft" }, `${units.plain(duration, 3)} s`));
-}
-
-function select(key, label, options, title) {
-  fields[key] = h("select", { id: `campaign-${key}`, title },
-    Object.entries(options).map(([value, text]) => h("option", { value }, text)));
-  return h("label", { className: "block" }, label, fields[key]);
-}
-
-function number(key, label, properties, title) {
-  fields[key] = h("input", { type: "number", id: `campaign-${key}`, title, ...properties });
-  return h("label", { className: "block" }, label, fields[key]);
-}
-
-/** {channel: SI} of the chosen noise. */
-const noise = () => Object.fromEntries(Object.keys(NOISY).map((name) =>
-  [name, NOISES[fields.noise.value] * units.channel(name).default_noise]));
-
-function noiseSaid() {
-  const said = Object.entries(noise()).filter(([, value]) => value > 0).map(([name, value]) => {
-    const { display_factor: factor, display_unit: unit } = units.channel(name);
-    return `${NOISY[name]} ${units.plain(value * factor, 3)} ${unit}`;
-  });
-  return said.length ? `Noise: ${said.join(", ")}.` : "The sensors are ideal.";
-}
-
-const chosen = () => [...parts.manoeuvres.querySelectorAll("input:checked")].map(({ value }) => value);
-
-function request() {
-  const { takes_vehicle: takes } = get("plants").find(({ key }) => key === fields.plant.value);
-  const factor = fields.class_factor.value;
-  return {
-    plant: fields.plant.value,
-    vehicle: takes ? withValues(get("vehicle"), get("values")) : null,
-    manoeuvres: chosen(),
-    class_factor: factor === "" ? null : Number(factor),
-    noise: noise(),
-    seed: Number(fields.seed.value),
-  };
+  return fold(memory, h("summary", {}, "Drive a campaign with virtual sensors"), fields, parts.outcome);
 }
 
 function start() {
   problem = "";
-  send(request, (error) => {
+  send(form.request, (error) => {
     if (error.code === undefined) throw error;
     if (!error.lost) problem = error.message;
   });
@@ -113,13 +44,14 @@ export async function resume() {
 }
 
 async function ended() {
-  if (whole().length) await takeOver();
+  if (absent()) await takeOver();
 }
 
 const whole = () => (current()?.result?.recordings ?? []).filter(({ state }) => state === "whole");
 
-/** Whether a recording of the campaign is not among the measurements. */
+/** Whether a recording that can be read back is not among the measurements. */
 function absent() {
+  if (current().format !== "csv") return false;
   const held = new Set(get("measurements").map(({ sha256 }) => sha256));
   return whole().some(({ sha256 }) => !held.has(sha256));
 }
@@ -131,40 +63,61 @@ async function takeOver() {
     const added = rows.filter(({ id }) => !held.has(id));
     set({ measurements: [...get("measurements"), ...added] });
     const count = added.length;
-    if (count) notice("info", `${count} ${count > 1 ? "recordings are" : "recording is"} in`, "The campaign drove them.");
+    if (count) {
+      notice("info", `${count} ${count > 1 ? "recordings are" : "recording is"} in`,
+        `The campaign drove ${count > 1 ? "them" : "it"}.`);
+    }
   } catch (error) {
     refused(error, "Adding the recordings");
   }
 }
 
+/** What is known of the car that drove becomes the session's car. */
+async function useCar() {
+  try {
+    await take(await api.campaignVehicle(current().id), "The car that drove is loaded");
+  } catch (error) {
+    refused(error, "Reading the car");
+  }
+}
+
 function show() {
-  const keys = chosen();
-  inPlace(parts.tools, () => parts.tools.replaceChildren(
-    busy()
-      ? h("button", { type: "button", id: "cancel-campaign", className: "danger", on: { click: cancel } }, "Cancel")
-      : h("button", { type: "submit", id: "drive", className: "primary", disabled: !keys.length }, "Drive"),
-    ...(busy() ? [bar()] : []),
-    h("span", { className: "hint", id: "campaign-state" }, busy() ? progress() : extent(keys)),
-  ), "#drive, #cancel-campaign");
+  showTools();
   inPlace(parts.outcome, () => parts.outcome.replaceChildren(...outcome()));
 }
 
-function bar() {
-  const { driven = 0, duration = 1 } = current().progress ?? {};
-  return h("progress", { max: duration, value: driven, "aria-label": "Seconds driven" });
+/** The button to drive or to cancel, built anew only where one takes the place of the other. */
+function showTools() {
+  const running = busy();
+  if (parts.running !== running) {
+    parts.running = running;
+    inPlace(parts.tools, () => parts.tools.replaceChildren(...tools(running)), "#drive, #cancel-campaign");
+  }
+  parts.state.textContent = running ? progress() : form.extent();
+  if (running) {
+    const { driven = 0, duration = 1 } = current().progress ?? {};
+    Object.assign(parts.bar, { max: duration, value: driven });
+  } else parts.drive.disabled = form.isEmpty();
+}
+
+function tools(running) {
+  parts.state = h("span", { className: "hint", id: "campaign-state" });
+  if (running) {
+    parts.bar = h("progress", { "aria-label": "Seconds driven" });
+    const stop = h("button", { type: "button", id: "cancel-campaign", className: "danger", on: { click: cancel } },
+      "Cancel");
+    return [stop, parts.bar, parts.state];
+  }
+  parts.drive = h("button", { type: "submit", id: "drive", className: "primary" }, "Drive");
+  return [parts.drive, parts.state];
 }
 
 function progress() {
-  const { runs, of, driven, duration } = current().progress ?? {};
+  const { runs, of, driven, duration, seconds } = current().progress ?? {};
   if (current().state === "queued" || of === undefined) return "Waiting for a worker …";
-  return `${runs} of ${of} drives, ${units.fixed(driven, 1)} of ${units.plain(duration, 4)} s`;
-}
-
-function extent(keys) {
-  if (!keys.length) return "Choose a manoeuvre at least.";
-  const lasting = get("manoeuvres").filter(({ key }) => keys.includes(key))
-    .reduce((sum, { duration }) => sum + duration, 0);
-  return `${keys.length} ${keys.length > 1 ? "drives" : "drive"}, ${units.plain(lasting, 4)} s`;
+  const left = driven > 0 ? (seconds * (duration - driven)) / driven : 0;
+  return `${runs} of ${of} drives, ${units.fixed(driven, 1)} of ${units.plain(duration, 4)} s` +
+    form.taking(left, "left");
 }
 
 /** What became of the newest campaign. */
@@ -185,6 +138,8 @@ function outcome() {
       h("a", { className: "button", id: "campaign-zip", download: "campaign.zip",
         href: api.campaignUrl(job.id) }, "Download all, with the truth"),
       absent() ? h("button", { type: "button", id: "take-over", on: { click: takeOver } },
-        "Add to the measurements") : null),
+        "Add to the measurements") : null,
+      job.vehicle ? null : h("button", { type: "button", id: "use-car", on: { click: useCar },
+        title: "What is known of the car that drove becomes the session's: sliders and baseline" }, "Use its car")),
   ];
 }

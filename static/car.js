@@ -28,7 +28,7 @@ export function build() {
 }
 
 /** Another car: sliders and baseline become its own. */
-async function take(vehicle, what) {
+export async function take(vehicle, what) {
   try {
     const saved = (await api.saveVehicle(vehicle)) ?? vehicle;
     await api.saveBaseline(saved);

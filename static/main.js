@@ -39,14 +39,17 @@ async function start() {
   api.useSession(sid);
   set({ session: sid, online: true, ready: false, compare: "baseline", road: null, liftOff: false, fit: null, fitJob: null,
     now: null, reference: null, measured: null, traction: "exact", braking: {} });
-  const [session, parameters, channels, vehicles, manoeuvres, plants, roads, rimsSettings] = await Promise.all([
+  const [
+    session, parameters, channels, vehicles, manoeuvres, plants, formats, roads, rimsSettings,
+  ] = await Promise.all([
     api.session(), api.parameters(), api.channels(), api.vehicles(), api.manoeuvres(), api.plants(),
-    api.roads(), api.rimsSettings(),
+    api.formats(), api.roads(), api.rimsSettings(),
   ]);
   units.learn(channels, parameters);
   const { vehicle, measurements: rows } = session;
   const baseline = session.baseline ?? vehicle;
-  set({ parameters, vehicles, manoeuvres, plants, roads, rimsSettings, vehicle, baseline, measurements: rows });
+  set({ parameters, vehicles, manoeuvres, plants, formats, roads, rimsSettings, vehicle, baseline,
+    measurements: rows });
   const usable = rows.find((row) => row.usable_for_identification);
   set({
     values: controls.valuesOf(vehicle),

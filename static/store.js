@@ -5,7 +5,7 @@
 //   vehicle      the session's vehicle, with the sliders' values in it
 //   baseline     the vehicle that the sliders are compared with
 //   values       {parameter name: SI value}, the sliders
-//   measurements, vehicles, manoeuvres, roads   lists of the service
+//   measurements, vehicles, manoeuvres, plants, formats, roads   lists of the service
 //   ride         {kind: "measurement", id} or {kind: "manoeuvre", key}
 //   road         null (as the manoeuvre says) or a road description
 //   traction     how a measured ride gets its traction, "exact" or "paper"

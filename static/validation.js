@@ -89,8 +89,8 @@ function content() {
     h("div", { className: "row-tools" },
       busy() ? h("button", { type: "button", id: "cancel-validation", className: "danger", on: { click: cancel } },
         "Cancel")
-        : h("button", { type: "button", id: "validate", className: "primary", on: { click: () => pivots.ready() && start(request) } },
-          "Validate"),
+        : h("button", { type: "button", id: "validate", className: "primary",
+          on: { click: () => pivots.ready() && start(request) } }, "Validate"),
       scores ? h("a", { className: "button", id: "report", target: "_blank", rel: "noopener",
         href: api.reportUrl(job.id) }, "Open report") : null,
       h("span", { className: "hint", id: "validation-state" }, state())),
