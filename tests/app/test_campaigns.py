@@ -20,7 +20,7 @@ from ridetune.engine.sensor_file import noisy
 from ridetune.engine.vehicle_file import reference_vehicles, vehicle_to_json
 
 from .conftest import PATIENCE, Visitor, open_client
-from .test_jobs import StandIn
+from .test_jobs import StandIn, until
 
 CAR = reference_vehicles()["paper"]
 PAPER = vehicle_to_json(CAR)
@@ -300,6 +300,26 @@ def test_the_same_key_drives_once(tmp_path, monkeypatch):
         assert submit(visitor, key="click-1") == first
         other = visitor.post("/campaigns", json={**SHORT, "seed": 6, "key": "click-1"})
         assert (other.status_code, other.json()["field"]) == (422, "key")
+
+
+def test_a_campaign_has_longer_than_other_jobs_to_hand_over_what_it_has(tmp_path, monkeypatch):
+    """Before its worker is killed, and minutes of driving with it."""
+    made = []
+    monkeypatch.setattr(
+        "ridetune.app.main.Cluster", lambda *place: made.append(StandIn(*place)) or made[-1]
+    )
+    with open_client(Settings(data=tmp_path)) as client:
+        visitor = Visitor(client)
+        run = visitor.get("/measurements").json()[0]["id"]
+        fit = visitor.submit("identifications", {"runs": [run]})["id"]
+        drives = submit(visitor)["id"]
+        for kind, job in (("identifications", fit), ("campaigns", drives)):
+            until(lambda: job in made[0].tasks)
+            made[0].start(job)
+            visitor.wait_for(kind, job, "running")
+            visitor.post(f"/{kind}/{job}/cancel")
+            assert visitor.wait_for(kind, job)["state"] == "cancelled"
+        assert made[0].graces[drives] > made[0].graces[fit]
 
 
 def test_the_plants_are_listed(client):

@@ -19,6 +19,7 @@ class StandIn:
     def __init__(self, address: str, scratch):
         self.tasks: dict[str, tuple] = {}
         self.cancelled: list[str] = []
+        self.graces: dict[str, float] = {}
         self.refusing = False
         self.meanwhile: Callable[[str], object] = lambda name: None
 
@@ -30,6 +31,7 @@ class StandIn:
 
     def cancel(self, name, grace):
         self.cancelled.append(name)
+        self.graces[name] = grace
         if name in self.tasks:
             self.end(name, "cancelled")
 
