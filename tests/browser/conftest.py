@@ -36,6 +36,15 @@ ARGUMENTS = [
 ]
 SAMPLES = Path(__file__).parents[2] / "sample_runs"
 PATIENCE = 60.0
+AWAY = (
+    "ERR_CONNECTION_REFUSED",
+    "ERR_CONNECTION_RESET",
+    "ERR_INCOMPLETE_CHUNKED_ENCODING",
+    "WebSocket connection",
+    "ERR_EMPTY_RESPONSE",
+    "status of 503",
+)
+"""What the browser says while the service is away."""
 NOISE = re.compile(r"THREE\.Clock|GPU stall|WebGL.*software|swiftshader", re.IGNORECASE)
 
 

@@ -1,8 +1,11 @@
 """A campaign on the page: driven, cancelled, refused, and taken over as measurements."""
 
 import json
+import signal
 
 import pytest
+
+from .conftest import AWAY, Service
 
 pytestmark = pytest.mark.browser
 
@@ -160,6 +163,27 @@ def test_the_detailed_car_drives_and_becomes_the_session_s_car(driver):
     )
     assert driver.look("ridetune.state('vehicle')") == file
     assert driver.look("ridetune.state('baseline')") == file
+
+
+def test_a_campaign_is_followed_on_after_the_service_has_been_away(visit, tmp_path):
+    """It was killed before a worker could begin."""
+    service = Service(tmp_path / "data")
+    try:
+        visitor = visit().open(service.address)
+        visitor.expect(*AWAY)
+        visitor.click("#tab-measurements")
+        visitor.page.locator("summary", has_text="Drive a campaign").click()
+        visitor.click("#drive")
+        visitor.until("ridetune.campaign() !== null")
+        service.stop(signal.SIGKILL)
+        state = visitor.element("#campaign-state")
+        assert state.inner_text() == "Waiting for a worker …"
+        service = Service(tmp_path / "data", service.port)
+        visitor.until("ridetune.campaign().state === 'done'", DRIVEN)
+        visitor.wait(lambda: visitor.element("#drive").count() == 1, "the form is free again")
+        visitor.until("ridetune.state('measurements').length === 4")
+    finally:
+        service.stop()
 
 
 def test_a_car_that_cannot_drive_here_is_shown_with_the_reason(visit, service):

@@ -6,18 +6,18 @@ import signal
 import numpy as np
 import pytest
 
-from .conftest import SAMPLES, Service, add_file, changed_pixels, take_car_without_brakes
+from .conftest import (
+    AWAY,
+    SAMPLES,
+    Service,
+    add_file,
+    changed_pixels,
+    take_car_without_brakes,
+)
 
 pytestmark = pytest.mark.browser
 
 STIFFNESS = "front.suspension.stiffness"
-AWAY = (
-    "ERR_CONNECTION_REFUSED",
-    "ERR_CONNECTION_RESET",
-    "WebSocket connection",
-    "ERR_EMPTY_RESPONSE",
-    "status of 503",
-)
 
 
 def press(visitor, selector, *keys):
