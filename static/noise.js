@@ -82,11 +82,11 @@ const inUnit = (name, value) => units.plain(value * units.channel(name).display_
 const said = (name, value) => value === undefined ? "not stated"
   : `${inUnit(name, value)} ${units.channel(name).display_unit} stated`;
 
-/** What a fit takes as a recording's noise, in a sentence. */
+/** What a fit takes as a recording's noise, that of the compared channels, in a sentence. */
 export function sentence({ noise }) {
-  const list = (names, value) => names.map((name) => `${SHORT[name] ?? name} ` +
+  const list = (names, value) => names.map((name) => `${SHORT[name]} ` +
     `${inUnit(name, value(name))} ${units.channel(name).display_unit}`).join(", ");
-  const stated = Object.keys(noise);
+  const stated = CHANNELS.filter((name) => name in noise);
   const others = CHANNELS.filter((name) => !(name in noise));
   const usual = list(others, (name) => units.channel(name).default_noise);
   return [stated.length ? `Noise as stated: ${list(stated, (name) => noise[name])}.` : "Noise is not stated.",
