@@ -1,11 +1,13 @@
 """The sample project every fresh session holds, read from the installed package."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+from ..engine.run_notes import manoeuvre_beside
 from .package_files import package_folder
 from .recordings import summary
 from .store import NewMeasurement
@@ -35,9 +37,7 @@ def sample_project() -> SampleProject:
 
 def _sample(path: Path) -> NewMeasurement:
     """A recording with its notes and its manoeuvre, called after its folder too."""
-    from ..engine.manoeuvre import manoeuvre_to_json, read_manoeuvre
     from ..engine.measurement import read_run
-    from ..engine.validation import manoeuvre_beside
 
     run = read_run(path)
     return NewMeasurement(
@@ -46,5 +46,5 @@ def _sample(path: Path) -> NewMeasurement:
         summary(run),
         dict(run.noise),
         sample=True,
-        manoeuvre=manoeuvre_to_json(read_manoeuvre(manoeuvre_beside(path))),
+        manoeuvre=json.loads(manoeuvre_beside(path).read_bytes()),
     )

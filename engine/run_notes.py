@@ -53,6 +53,11 @@ def notes_beside(recording: Path) -> Path:
     return recording.parent / f"{recording.stem}.toml"
 
 
+def manoeuvre_beside(recording: Path) -> Path:
+    """Where the manoeuvre of a recording lies, if it is known."""
+    return recording.parent / f"{recording.stem}.manoeuvre.json"
+
+
 def read_notes(path: Path) -> RunNotes:
     """The notes in a file, checked; every message starts with the file's name."""
     try:

@@ -7,7 +7,6 @@ and, where the run's manoeuvre is known, over its road by its torques with the c
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -144,11 +143,6 @@ def geometry_from_json(data: Any, source: str = "geometry") -> Geometry:
             f'{source}: it holds no pivot; add "front": {{"distance": m, "angle": rad}}, or "rear".'
         )
     return geometry
-
-
-def manoeuvre_beside(recording: Path) -> Path:
-    """Where the manoeuvre of a recording lies, if it is known."""
-    return recording.parent / f"{recording.stem}.manoeuvre.json"
 
 
 def check_cases(cases: Sequence[Case]) -> list[str]:

@@ -15,8 +15,9 @@ from ridetune.engine.detailed.plant import DetailedPlant
 from ridetune.engine.detailed.side_view import instant_centres
 from ridetune.engine.manoeuvre import read_manoeuvre
 from ridetune.engine.measurement import missing_for_identification, read_run
+from ridetune.engine.run_notes import manoeuvre_beside
 from ridetune.engine.sensor_file import read_sensors
-from ridetune.engine.validation import geometry_from_json, manoeuvre_beside
+from ridetune.engine.validation import geometry_from_json
 from ridetune.engine.vehicle_file import read_vehicle, reference_vehicles
 
 FOLDER = Path(__file__).parents[1] / "sample_runs"

@@ -11,13 +11,13 @@ from ...engine.errors import VehicleError
 from ...engine.fit_file import fit_to_json
 from ...engine.json_text import read_json
 from ...engine.manoeuvre import Manoeuvre, read_manoeuvre
+from ...engine.run_notes import manoeuvre_beside
 from ...engine.validation import (
     Case,
     Geometry,
     Validation,
     check_cases,
     geometry_from_json,
-    manoeuvre_beside,
 )
 from ...engine.validation import validate as predict
 from ...engine.validation_file import validation_to_json

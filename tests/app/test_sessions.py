@@ -1,5 +1,8 @@
 """Sessions: the sample project in a fresh one, and nobody sees another's."""
 
+import subprocess
+import sys
+
 import pytest
 from ridetune.app.settings import Settings
 
@@ -16,7 +19,19 @@ def test_a_fresh_session_holds_the_sample_project(visitor):
         "detailed_manoeuvre_2.csv",
     ]
     assert all(kept["usable_for_identification"] for kept in session["measurements"])
+    driven = [kept["manoeuvre"]["name"] for kept in session["measurements"]]
+    assert [name.partition(":")[0] for name in driven] == ["Manoeuvre 1", "Manoeuvre 2"]
     assert session["identifications"] == []
+
+
+def test_a_first_session_does_not_wait_for_the_compiler():
+    """numba takes seconds to load; the page answers while it does."""
+    program = (
+        "import sys; from ridetune.app.samples import sample_project; sample_project();"
+        "print('numba' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.stdout == "False\n", done.stderr
 
 
 def test_the_vehicle_is_replaced_and_the_baseline_stays(visitor):
