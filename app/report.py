@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ..engine.channels import CHANNELS
-from ..engine.parameters import PARAMETERS
+from ..engine.parameters import ALL_PARAMETERS
 from .package_files import package_folder
 
 ENTRY = "report.js"
@@ -89,7 +89,7 @@ def _tables() -> dict[str, Any]:
         "channels": [
             {field: getattr(info, field) for field in CHANNEL_FIELDS} for info in CHANNELS.values()
         ],
-        "parameters": [asdict(row) for row in PARAMETERS],
+        "parameters": [asdict(row) for row in ALL_PARAMETERS],
     }
 
 

@@ -19,7 +19,8 @@ def file(tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
     name = "<img src=x onerror=alert(1)>.csv"
     (folder / name).write_bytes((SAMPLES / "twin/manoeuvre_1.csv").read_bytes())
-    command = ["validate", str(folder / name), "--vehicle", "paper", "--free", "K_F"]
+    command = ["validate", str(folder / name), "--vehicle", "paper"]
+    command += ["--free", "K_F", "front.suspension.rebound_ratio"]
     command += [
         "--hold-out",
         str(SAMPLES / "twin/manoeuvre_2.csv"),
