@@ -87,18 +87,18 @@ function changed(change) {
   return h("td", { className: less ? "less" : "more" }, `${less ? "▼" : "▲"} ${size}`);
 }
 
-/** How far the simulated motion follows the measured one. */
+/** How far the simulated motion follows the measured one, channel by channel. */
 function fits(now, other, name) {
   const channels = Object.keys(now.fit_percent ?? {});
   if (!channels.length) return null;
-  const cells = (head) => channels.map((channel) =>
-    h("td", {}, head && channel in head.fit_percent ? percent(head.fit_percent[channel]) : "–"));
-  return h("table", { className: "fits" },
+  const cell = (head, channel) =>
+    h("td", {}, channel in (head.fit_percent ?? {}) ? percent(head.fit_percent[channel]) : "–");
+  return h("table", { className: "metrics fits" },
     h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Follows the measurement"),
-      channels.map((channel) => h("th", { scope: "col" }, short(channel))))),
-    h("tbody", {},
-      other ? h("tr", {}, h("th", { scope: "row" }, name), cells(other)) : null,
-      h("tr", { className: "strong" }, h("th", { scope: "row" }, "Now"), cells(now))));
+      other ? h("th", { scope: "col" }, name) : null, h("th", { scope: "col" }, "Now"))),
+    h("tbody", {}, channels.map((channel) => h("tr", {},
+      h("th", { scope: "row" }, units.channel(channel).label),
+      other ? cell(other, channel) : null, cell(now, channel)))));
 }
 
 export const short = (channel) => channel.replace("chassis.", "");

@@ -144,7 +144,7 @@ function estimateRow(estimate) {
     }, estimate.at_bound ? `at ${upper ? "upper" : "lower"}` : WELL[estimate.determined])));
 }
 
-/** Fit percent of every run, fitted or held out. */
+/** Fit percent of every run, fitted or held out, in the channels that the fit compares. */
 function scores(job, holdouts) {
   const { result } = job;
   const inFit = distinct(job.runs.map(({ name }) => name));
@@ -152,8 +152,7 @@ function scores(job, holdouts) {
     [nameOf(id) ?? name, "fitted", result.fit_percent[inFit[k]]]);
   const unseen = Object.entries(holdouts).map(([id, score]) =>
     [nameOf(id) ?? "deleted", "held out", score]);
-  const channels = [...new Set([...fitted, ...unseen].flatMap(([, , score]) =>
-    score && typeof score === "object" ? Object.keys(score) : []))];
+  const channels = [...new Set(fitted.flatMap(([, , score]) => Object.keys(score)))];
   return h("table", { className: "scores" },
     h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Fit, %"),
       channels.map((channel) => h("th", { scope: "col" }, short(channel))))),
