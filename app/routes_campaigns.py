@@ -127,7 +127,7 @@ def _ended(services: Services, sid: str, jid: str) -> Job:
     job = services.jobs.get(sid, jid, KIND)
     if job.file is None:
         remedy = "drive it again" if job.ended else "wait until it has ended"
-        raise Conflict(f"The campaign is {job.state} and has no files; {remedy}.")
+        raise Conflict(f"The campaign has no files, its state is {job.state}; {remedy}.")
     return job
 
 

@@ -61,5 +61,5 @@ def _document(services: Services, sid: str, jid: str) -> Any:
     job = services.jobs.get(sid, jid, KIND)
     if job.file is None:
         remedy = "ask for it again" if job.ended else "wait until it is done"
-        raise Conflict(f"The validation is {job.state} and has no report; {remedy}.")
+        raise Conflict(f"The validation has no report, its state is {job.state}; {remedy}.")
     return services.store.directory.original(job.file)

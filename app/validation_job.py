@@ -52,7 +52,9 @@ def check_and_fill(
     from ..engine.validation import check_cases, geometry_from_json
 
     if fitted.result is None:
-        raise Conflict(f"The identification is {fitted.state} and has no fit; wait, or fit again.")
+        raise Conflict(
+            f"The identification has no fit, its state is {fitted.state}; wait, or fit again."
+        )
     held = [store.measurement(session, one) for one in request.hold_out]
     runs = [{**one, "role": "fit"} for one in fitted.spec["runs"]]
     runs += [
