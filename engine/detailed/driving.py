@@ -143,7 +143,7 @@ class _Drive:
         try:
             system.SolveDynamic(self._settings())
             if self._failure is None and self._lost is None:
-                self._last_sample()
+                self._sample(self._motion())
         except model.exudyn.ExudynError:
             self._lost = self._lost or self.histories.farthest_astray()[0]
         if self._failure is not None:
@@ -188,29 +188,22 @@ class _Drive:
             return False
 
     def _set_forces(self, system: Any, end: float) -> bool:
-        sampled = self._done % self._every == 0
         if self._done % REPORT == 0:
             self._told(self._done / self._steps)
             if self._cancelled():
                 raise Cancelled("The run of the detailed car was cancelled.")
         motion = self._motion()
-        height, rate = self._road(motion)
+        if self._done % self._every == 0 and not self._sample(motion):
+            return False
+        height, rate = self._road(motion, self._step)
         load = self._tyres.load(motion, height, rate)
         drive, brake = self._torques(end)
-        if sampled and not self._sample(WheelSample(load, height, drive, brake)):
-            return False
         force, torque = self._tyres.advance(self._motion(self._step), load, self._step)
         self._set_wheels(system, motion, height, rate, force, torque, drive)
         for number, most in zip(self._model.brakes, brake, strict=True):
             system.SetObjectParameter(number, "damping", most)
         self._done += 1
         return True
-
-    def _last_sample(self) -> None:
-        motion = self._motion()
-        height, rate = self._road(motion)
-        load = self._tyres.load(motion, height, rate)
-        self._sample(WheelSample(load, height, *self._torques(self._done * self._step)))
 
     def _torques(self, time: float) -> tuple[Array, Array]:
         """Drive and brake torques (4,) that are asked for at a time, N m."""
@@ -226,10 +219,10 @@ class _Drive:
             qd = qd + ahead * data.GetODE2Coordinates_tt().reshape(-1, 6)[wheels]
         return wheel_motion(q, qd, self._offset)
 
-    def _road(self, motion: WheelMotion) -> tuple[Array, Array]:
-        """Height and its rate (4,) under the wheels where the step will take them."""
+    def _road(self, motion: WheelMotion, ahead: float = 0.0) -> tuple[Array, Array]:
+        """Height and its rate (4,) under the wheels where their speeds take them a time later."""
         speed = motion.velocity[:, 0]
-        height, slope = self._ground.under(motion.centre[:, 0] + self._step * speed - self._origin)
+        height, slope = self._ground.under(motion.centre[:, 0] + ahead * speed - self._origin)
         return height, slope * speed
 
     def _set_wheels(self, system, motion, height, rate, force, torque, drive) -> None:
@@ -244,11 +237,13 @@ class _Drive:
             if (reaction := model.reactions[k]) is not None:
                 system.SetLoadParameter(reaction, "loadVector", -drive[k] * motion.axle[k])
 
-    def _sample(self, wheels: WheelSample) -> bool:
+    def _sample(self, motion: WheelMotion) -> bool:
         """Keep the present state, unless a body has left its place in the car: then False."""
         body, distance = self.histories.farthest_astray()
         if distance > ASTRAY:
             self._lost = body
             return False
-        self.histories.keep(wheels)
+        height, rate = self._road(motion)
+        load = self._tyres.load(motion, height, rate)
+        self.histories.keep(WheelSample(load, height, *self._torques(self._done * self._step)))
         return True

@@ -5,12 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from ridetune.engine.detailed.builder import Model
 from ridetune.engine.detailed.car_file import reference_car
 from ridetune.engine.detailed.driving import LONGEST_STEP, DetailedRunDiverged, drive
-from ridetune.engine.detailed.point_mass import apparent_mass
+from ridetune.engine.detailed.equilibrium import settle
+from ridetune.engine.detailed.ground import patch_road
+from ridetune.engine.detailed.point_mass import apparent_mass, point_mass
+from ridetune.engine.detailed.pose import point
 from ridetune.engine.errors import Cancelled, SimulationError
 from ridetune.engine.frames import CORNERS, GRAVITY
 from ridetune.engine.manoeuvre import Manoeuvre, reference_manoeuvres
+from ridetune.engine.road import LEFT
+from ridetune.engine.road_specs import BumpRoad
 from ridetune.engine.torque_laws import Deceleration, DriveTable
 
 CAR = reference_car()
@@ -28,6 +34,30 @@ def test_at_rest_it_rests():
         assert np.abs(run[name]).max() < 1e-6
     loads = sum(run[f"tyre.{corner}.load"][-1] for corner in CORNERS)
     assert loads == pytest.approx(CAR.total_mass * GRAVITY, rel=1e-6)
+
+
+def test_what_acts_at_the_wheels_is_of_the_sample_s_own_time():
+    """Oracle: where the wheels rest, the averaged road and the tyre's law there; the table.
+
+    At 20 m/s the road rises by 1.2 mm in a step, which is 240 N of load.
+    """
+    table = DriveTable((0.0, 0.02), (0.0, 400.0))
+    bump = BumpRoad(1.0, 1.0, 0.02)
+    manoeuvre = Manoeuvre("on", "road", 0.02, initial_speed=20.0, drive=table, road=bump)
+    run = drive(CAR, manoeuvre)
+    assert_allclose(run["drive.rl.torque"], 1e4 * run.time, atol=1e-9)
+    model = Model(CAR)
+    front = CAR.wheels[0]
+    q = (settle(model) + model.design)[model.wheels[0]]
+    x, _, z = point(q, model.in_body(front.body, front.centre))
+    road = patch_road(manoeuvre.demand(point_mass(CAR)).road, CAR.tyre.patch_length)
+    x -= CAR.measured_point[0]
+    height, slope = road.height(LEFT, x), road.slope(LEFT, x)
+    assert slope > 0.03
+    assert run["road.fl.z"][0] == pytest.approx(height, rel=1e-9)
+    squeeze = CAR.tyre.free_radius + height - z
+    load = CAR.tyre.stiffness * squeeze + CAR.tyre.damping * 20.0 * slope
+    assert run["tyre.fl.load"][0] == pytest.approx(load, rel=1e-9)
 
 
 def test_what_stands_stays_standing_at_the_longest_step():
