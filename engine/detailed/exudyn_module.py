@@ -2,12 +2,17 @@
 
 import sys
 from contextlib import redirect_stdout
+from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 from io import StringIO
+from threading import Lock
 from typing import Any
 
 from ..errors import SimulationError
+
+_IMPORTING = Lock()
+"""Standard output is one for all threads: two that turn it aside would not both turn it back."""
 
 INSTALL = 'pip install "ridetune[detailed]"'
 
@@ -27,6 +32,12 @@ def require_exudyn() -> tuple[Any, Any]:
     """
     if said := missing_exudyn():
         raise SimulationError(said)
+    with _IMPORTING:
+        return _imported()
+
+
+@cache
+def _imported() -> tuple[Any, Any]:
     if "exudyn" not in sys.modules:
         sys.exudynFast = True  # pyright: ignore[reportAttributeAccessIssue]  # read by the import
     with redirect_stdout(StringIO()):
