@@ -74,7 +74,7 @@ def _mistakes(car: DetailedCar) -> Iterator[tuple[str, str]]:
         for k, line in enumerate(getattr(car, section)):
             if np.allclose(*line.ends):
                 yield f"{section}[{k}].ends", "are one point; move one of them."
-    yield from _off_axle(car)
+    yield from _spoilt_wheels(car)
     if not any(wheel.driven_against for wheel in car.wheels):
         yield "wheels", 'are none of them driven; give one a "driven_against".'
     if loose := sorted(_loose(car)):
@@ -133,16 +133,25 @@ def _pairs(car: DetailedCar) -> Iterator[tuple[str, str]]:
                 yield f"{section}[{k}].bodies", f'are both "{element.bodies[0]}"; name two.'
 
 
-def _off_axle(car: DetailedCar) -> Iterator[tuple[str, str]]:
-    """Wheels whose turning bodies are not balanced about the axle."""
+def _spoilt_wheels(car: DetailedCar) -> Iterator[tuple[str, str]]:
+    """Wheels that cannot turn, are not balanced about their axle, or are driven one by one."""
     group_of = {name: group for group in rigid_groups(car) for name in group.names}
     for k, wheel in enumerate(car.wheels):
+        if wheel.carrier in group_of[wheel.body].names:
+            yield (
+                f"wheels[{k}].carrier",
+                f'is "{wheel.carrier}", which is one rigid body with "{wheel.body}" that is to turn'
+                " in it; correct one of the two.",
+            )
         away = np.subtract(wheel.centre, group_of[wheel.body].cg)
         if (off := float(np.hypot(away[0], away[2]))) > BALANCE:
             yield (
                 f"wheels[{k}].centre",
                 f"is {1e3 * off:.1f} mm off the axis through the CG of what turns; correct it.",
             )
+    for axle in AXLES:
+        if len({wheel.driven_against is None for wheel in car.wheels_of(axle)}) > 1:
+            yield "wheels", f'of the {axle} axle are driven by halves; give both "driven_against".'
 
 
 def _loose(car: DetailedCar) -> set[str]:

@@ -62,6 +62,14 @@ def off_axle(data):
     data["wheels"][0]["centre"][2] += 0.01
 
 
+def locked(data):
+    data["wheels"][0]["carrier"] = data["wheels"][0]["body"]
+
+
+def half_driven(data):
+    del data["wheels"][2]["driven_against"]
+
+
 def fifth_spring(data):
     data["springs"].append(data["springs"][0])
 
@@ -80,6 +88,8 @@ def fifth_spring(data):
         (twice, 'bodies hold "chassis" 2 times', "rename"),
         (to_itself, 'bushings[0].bodies are both "chassis"', "name two"),
         (off_axle, "wheels[0].centre is 10.0 mm off", "correct it"),
+        (locked, 'wheels[0].carrier is "f_rim_L"', "correct one of the two"),
+        (half_driven, "wheels of the rear axle are driven by halves", 'give both "driven_against"'),
         (fifth_spring, 'springs are 2 of "fl"', "give one"),
     ],
 )
