@@ -34,7 +34,7 @@ SMALL_STEP = 5e-3
 """Greatest step of the road, m; the tyres are squeezed by thrice as much."""
 
 LOCKED = 0.2
-"""Least rise of the wheel centre for a rise of the road: below it the suspension is locked."""
+"""Least rise of a wheel for a rise of the road: below it the suspension is locked."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,11 +82,6 @@ def _instant_centre(model: Model, axle: AxleName, height: float, rest: Array) ->
         return point((q + model.design)[carrier], offset)
 
     moved = centre(upper) - centre(lower)
-    if not moved[2] > LOCKED * INCREMENT:
-        raise SimulationError(
-            f"The {axle} suspension is locked: its wheels do not rise with the road; check the"
-            " joints and points of its links."
-        )
     turn = rotation(upper[carrier, 3:]) @ rotation(lower[carrier, 3:]).T
     turned = float(turn[0, 2] - turn[2, 0]) / 2.0
     place = (centre(upper) + centre(lower)) / 2.0
@@ -102,11 +97,19 @@ def _instant_centre(model: Model, axle: AxleName, height: float, rest: Array) ->
 
 
 def around(model: Model, axle: AxleName, height: float) -> tuple[Array, Array]:
-    """Displacements (groups, 6) of a clamped model with an axle's road just below and above."""
-    return (
-        _raised(model, axle, height - INCREMENT / 2.0),
-        _raised(model, axle, height + INCREMENT / 2.0),
-    )
+    """Displacements (groups, 6) of a clamped model with an axle's road just below and above.
+
+    Raises SimulationError for a suspension that does not let its wheels follow.
+    """
+    lower = _raised(model, axle, height - INCREMENT / 2.0)
+    upper = _raised(model, axle, height + INCREMENT / 2.0)
+    wheels = [model.index[wheel.body] for wheel in model.car.wheels_of(axle)]
+    if not np.all(upper[wheels, 2] - lower[wheels, 2] > LOCKED * INCREMENT):
+        raise SimulationError(
+            f"The {axle} suspension is locked: its wheels do not rise with the road; check the"
+            " joints and points of its links."
+        )
+    return lower, upper
 
 
 def _raised(model: Model, axle: AxleName, height: float) -> Array:

@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from ridetune.engine.detailed.builder import Model
 from ridetune.engine.detailed.car_file import reference_car
+from ridetune.engine.detailed.concept import known_vehicle
 from ridetune.engine.detailed.equilibrium import settle
 from ridetune.engine.detailed.modes import modes
 from ridetune.engine.detailed.records import Joint
@@ -86,5 +87,7 @@ def test_a_locked_suspension_is_named():
         Joint("revolute", ("f_subframe", f"f_knuckle_{side}"), (0.0, 0.0, 0.3), (0.0, 0.0, 1.0))
         for side in "LR"
     )
-    with pytest.raises(SimulationError, match=r"front suspension (is locked|does not follow)"):
-        instant_centres(Model(replace(CAR, joints=CAR.joints + welds)), "front", (0.0,))
+    car = replace(CAR, joints=CAR.joints + welds)
+    for ask in (lambda: instant_centres(Model(car), "front", (0.0,)), lambda: known_vehicle(car)):
+        with pytest.raises(SimulationError, match=r"front suspension (is locked|does not follow)"):
+            ask()
