@@ -1,11 +1,14 @@
 """The text of a JSON file, parsed strictly: one value a key, finite numbers, a clear sentence."""
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from .errors import RideError
+
+_SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 
 LARGEST_FILE = 5_000_000
 """Longest JSON file that is read, bytes; a fit with its histories fits in easily."""
@@ -36,6 +39,7 @@ def parse_json(data: bytes, source: str, error: type[RideError]) -> Any:
     try:
         content = json.loads(text, object_pairs_hook=_Object)
         doubled = next(_doubled(content), None)
+        whole = _SURROGATE.search(text) is None or _is_writable(content)
     except json.JSONDecodeError as cause:
         raise error(
             f"{source}: line {cause.lineno}, column {cause.colno}: not valid JSON ({cause.msg});"
@@ -47,7 +51,18 @@ def parse_json(data: bytes, source: str, error: type[RideError]) -> Any:
         ) from cause
     if doubled is not None:
         raise error(f"{source}: {doubled} is given twice; keep one of them.")
+    if not whole:
+        raise error(f"{source}: it holds half a character (a lone surrogate); write it whole.")
     return content
+
+
+def _is_writable(content: Any) -> bool:
+    """Whether every text can be written in UTF-8, which half a character cannot."""
+    try:
+        json.dumps(content, ensure_ascii=False).encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 class _Object(dict[str, Any]):

@@ -4,8 +4,9 @@ from ridetune.engine.json_text import LARGEST_FILE, parse_json, read_json
 
 
 def test_good_json_is_returned_as_it_stands():
-    text = '\ufeff{"a": [1, 2.5, "é", null], "b": {}}'.encode()
-    assert parse_json(text, "f.json", RideError) == {"a": [1, 2.5, "é", None], "b": {}}
+    text = '\ufeff{"a": [1, 2.5, "é", null], "b": {"c": "\\ud83d\\ude00"}}'.encode()
+    expected = {"a": [1, 2.5, "é", None], "b": {"c": "\U0001f600"}}
+    assert parse_json(text, "f.json", RideError) == expected
 
 
 @pytest.mark.parametrize(
@@ -19,6 +20,7 @@ def test_good_json_is_returned_as_it_stands():
         (b"1" * 5000, "endless number"),
         (b'{"a": 1, "a": 2}', "f.json: a is given twice; keep one"),
         (b'{"a": [{}, {"b": 1, "c": 2, "b": 3}]}', "f.json: a[1].b is given twice"),
+        (rb'{"name": "\ud83d\ud83d\ude00"}', "f.json: it holds half a character"),
         (b" " * (LARGEST_FILE + 1), "f.json: larger than 5 MB"),
     ],
 )
