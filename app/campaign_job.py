@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from .campaign_archive import CampaignArchive
 from .errors import InvalidRequest, OverBudget
 from .job_store import Job
-from .jobs import Kind, digest
+from .jobs import Kind
 from .plants import Known, known_plant
 from .schemas import CampaignRequest
 from .settings import Limits
@@ -44,11 +44,6 @@ def campaign() -> Kind:
         return job.spec
 
     return Kind(task=drive_manoeuvres, payload=payload, grace=GRACE)
-
-
-def as_asked(request: CampaignRequest) -> str:
-    """What stands for a request: the same whenever it is sent."""
-    return digest(request.model_dump(mode="json", exclude={"key"}))
 
 
 def check_and_fill(

@@ -18,6 +18,7 @@ from typing import Any
 from ..engine.errors import RideError
 from .cluster import Cluster
 from .job_store import Job
+from .schemas import WireForm
 from .store import Store
 from .worker import Ending, Task
 
@@ -31,6 +32,11 @@ SAVE_EVERY = 1.0
 def digest(form: Mapping[str, Any]) -> str:
     """What stands for a request in the form of JSON."""
     return hashlib.sha256(json.dumps(form, sort_keys=True).encode()).hexdigest()
+
+
+def as_asked(request: WireForm) -> str:
+    """What stands for a request of one spelling: the same whenever it is sent."""
+    return digest(request.model_dump(mode="json", exclude={"key"}))
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,11 @@ from starlette.concurrency import run_in_threadpool
 
 from ..engine.run_notes import parse_notes
 from .access import SessionId
-from .campaign_job import KIND, as_asked, check_and_fill
+from .campaign_job import KIND, check_and_fill
 from .errors import Conflict, NotFound
 from .job_routes import View, job_router, submitted
 from .job_store import Job
+from .jobs import as_asked
 from .recordings import recorded
 from .routes_measurements import measurement_to_json
 from .schemas import CampaignRequest

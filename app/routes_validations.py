@@ -9,10 +9,11 @@ from .access import SessionId
 from .errors import Conflict
 from .identification_job import KIND as IDENTIFICATION
 from .job_routes import View, job_router, submitted
+from .jobs import as_asked
 from .report import SERVED_POLICY, report
 from .schemas import ValidationRequest
 from .services import Services, Shared
-from .validation_job import BYTES_A_RUN, KIND, as_asked, check_and_fill
+from .validation_job import BYTES_A_RUN, KIND, check_and_fill
 
 ASKED = ("identification", "runs", "manoeuvres", "braking", "geometry")
 """What a job shows of its request; `runs` are those fitted and held out, with their `role`."""

@@ -13,7 +13,7 @@ from ..engine.vehicle_file import vehicle_from_json
 from .errors import Conflict, InvalidRequest
 from .identification_job import check_budget
 from .job_store import Job
-from .jobs import Kind, digest
+from .jobs import Kind
 from .recordings import Recordings, with_braking
 from .schemas import ValidationRequest
 from .settings import Limits
@@ -33,11 +33,6 @@ def validation(store: Store, recordings: Recordings) -> Kind:
         return {**job.spec, "recordings": _runs(job.spec, job.session, store, recordings)}
 
     return Kind(task=validate_runs, payload=payload)
-
-
-def as_asked(request: ValidationRequest) -> str:
-    """What stands for a request: the same whenever it is sent."""
-    return digest(request.model_dump(mode="json", exclude={"key"}))
 
 
 def check_and_fill(
