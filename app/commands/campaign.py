@@ -34,11 +34,11 @@ def campaign(options: Namespace) -> None:
         refuse_input(folder / name, _inputs(options))
     if not options.force:
         refuse_to_overwrite(folder / name for name in names)
-    _write(folder, files_of_car(planned))
     kept: list[Recording] = []
     try:
         with watch(_line) as progress:
             recordings = drive(planned, processes=options.processes, progress=progress)
+            _write(folder, files_of_car(planned))
             for recording in recordings:
                 _remove_old(folder, recording, options.form)
                 progress.clear()
