@@ -287,8 +287,11 @@ def channel(name: str) -> ChannelInfo:
 def near_channel(name: str) -> str | None:
     """The known channel a name may be a misspelling of; case and separators do not count."""
     bare = _bare(name)
+    # At a ratio of 0.8 the longer text has at most 1.5 times the letters of the other.
+    alike = [known for known in CHANNELS if len(bare) <= 1.5 * len(_bare(known))]
     ratio, best = max(
-        (SequenceMatcher(None, bare, _bare(known)).ratio(), known) for known in CHANNELS
+        ((SequenceMatcher(None, bare, _bare(known)).ratio(), known) for known in alike),
+        default=(0.0, None),
     )
     return best if ratio >= 0.8 else None
 

@@ -9,7 +9,6 @@ Other keys are for other readers, such as the vehicle that was driven.
 """
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 
 from .channels import channel
 from .errors import MeasurementError
+from .toml_text import LARGEST_FILE, parse_toml
 
 DEFAULT_NOISE = {
     "chassis.z": 0.5e-3,
@@ -28,10 +28,6 @@ DEFAULT_NOISE = {
     "chassis.roll": math.radians(0.02),
 }
 """Standard deviation of a channel's noise where neither the run nor the caller states one, SI."""
-
-LARGEST_FILE = 1_000_000
-"""Longest file of notes that is read, bytes."""
-
 
 LOUDEST = 3
 """Multiple of a channel's standard deviation beyond which a stated noise is doubtful ..."""
@@ -72,12 +68,7 @@ def read_notes(path: Path) -> RunNotes:
 
 def parse_notes(data: bytes, source: str) -> RunNotes:
     """The notes in the bytes of a file; `source` heads every message."""
-    if len(data) > LARGEST_FILE:
-        raise MeasurementError(f"{source}: larger than 1 MB; notes hold noise and a description.")
-    try:
-        notes = tomllib.loads(data.decode("utf-8-sig").replace("\r\n", "\n"))
-    except (ValueError, RecursionError) as error:
-        raise MeasurementError(f"{source}: not valid TOML ({error}); correct it.") from error
+    notes = parse_toml(data, source)
     for name in notes:
         near = get_close_matches(name.lower(), ("noise", "description"), n=1, cutoff=0.75)
         if near and near[0] != name:

@@ -19,8 +19,7 @@
 What `sensors` lists is recorded, and nothing else; without it the usual channels, ideally.
 """
 
-import json
-import tomllib
+from codecs import BOM_UTF8
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Annotated, Any
@@ -29,8 +28,9 @@ from .channels import channel
 from .errors import MeasurementError
 from .frames import AXLES, CORNERS
 from .json_record import RecordReader, describe
-from .run_notes import LARGEST_FILE
+from .json_text import parse_json
 from .sensors import RATE, RECORDED, Sensor, SensorSet
+from .toml_text import LARGEST_FILE, parse_toml
 from .units import UnitError
 from .vehicle import Range
 
@@ -75,13 +75,9 @@ def content_of(data: bytes, source: str) -> Any:
     """What a file says, TOML or JSON, as parsed and not looked at; MeasurementError names it."""
     if len(data) > LARGEST_FILE:
         raise MeasurementError(f"{source}: larger than 1 MB; a file of sensors is short.")
-    try:
-        text = data.decode("utf-8-sig").replace("\r\n", "\n")
-        return json.loads(text) if text.lstrip().startswith("{") else tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise MeasurementError(
-            f"{source}: neither valid TOML nor JSON ({error}); correct it."
-        ) from error
+    if data.removeprefix(BOM_UTF8).lstrip().startswith(b"{"):
+        return parse_json(data, source, MeasurementError)
+    return parse_toml(data, source)
 
 
 def sensors_from_json(data: Any, source: str = "sensors") -> SensorSet:

@@ -141,7 +141,8 @@ def test_a_file_of_sensors_is_read_for_a_campaign(visitor):
 @pytest.mark.parametrize(
     ("data", "said"),
     [
-        (b"[sensors", "s.toml: neither valid TOML nor JSON"),
+        (b"[sensors", "s.toml: not valid TOML"),
+        (b"a." * 100_000, "s.toml: line 1 has more than 200 dots"),
         (b'[sensors."chassis.zz"]', "s.toml: sensors.chassis.zz is not known"),
         (b"rate_hz = nan", "s.toml: rate_hz is nan, but must lie"),
         (b"#" * 1_000_001, "s.toml: larger than 1 MB"),

@@ -3,13 +3,8 @@ import math
 import numpy as np
 import pytest
 from ridetune.engine.errors import MeasurementError
-from ridetune.engine.run_notes import (
-    LARGEST_FILE,
-    checked_noise,
-    doubtful_noise,
-    parse_notes,
-    read_notes,
-)
+from ridetune.engine.run_notes import checked_noise, doubtful_noise, parse_notes, read_notes
+from ridetune.engine.toml_text import LARGEST_FILE
 
 
 def test_notes_state_noise_and_description():
@@ -36,6 +31,7 @@ def test_empty_notes_state_nothing():
         (b"[noise", "r.toml: not valid TOML (Expected ']'"),
         (b"\xff", "r.toml: not valid TOML ("),
         (b"a=" + b"[" * 100_000, "r.toml: not valid TOML ("),
+        (b"[noise]\n" + b"a." * 5000 + b"b = 1", "r.toml: line 2 has more than 200 dots"),
         (b" " * (LARGEST_FILE + 1), "r.toml: larger than 1 MB"),
         (b"[nosie]\na = 1", "r.toml: nosie is not known; did you mean noise?"),
         (b"noise = 3", "r.toml: noise must be a table"),

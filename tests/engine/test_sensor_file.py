@@ -123,9 +123,12 @@ def test_a_delay_as_long_as_the_run_is_refused():
 def test_a_file_that_cannot_be_read_is_refused(tmp_path):
     path = tmp_path / "s.toml"
     path.write_text("rate_hz = ")
-    with pytest.raises(MeasurementError, match=r"s\.toml: neither valid TOML nor JSON"):
+    with pytest.raises(MeasurementError, match=r"s\.toml: not valid TOML"):
         read_sensors(path)
-    path.write_text("[sensors]\n" + "a." * 5000 + "b = {}")
+    path.write_text('{"rate_hz": 100, "rate_hz": 200}')
+    with pytest.raises(MeasurementError, match=r"s\.toml: rate_hz is given twice; keep one"):
+        read_sensors(path)
+    path.write_text("[sensors]\n" + "a." * 100 + "b = {}")
     with pytest.raises(
         MeasurementError, match=r"s\.toml: sensors\.a\.\S+ is nested deeper than any"
     ):
