@@ -98,7 +98,7 @@ class Campaign:
             driven = self.plant.drive(
                 manoeuvre, sample_step=self.plant.step, progress=progress, cancelled=cancelled
             )
-            if driven.run is None:
+            if driven.run is None or self.sensors.samples(driven.run.duration) < 2:
                 return Recording(name, manoeuvre, None, driven.failure)
             run = measured(driven.run, self.sensors, self.seed, self.streams[name])
         except Cancelled:

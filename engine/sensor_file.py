@@ -126,6 +126,12 @@ def check_sensors(
             f"is {rate:g}, but the {car} car is simulated in steps of {1e3 * step:g} ms,"
             f" {fastest:g} Hz; take no more than that.",
         )
+    if sensors.samples(duration) < 2:
+        raise refuse(
+            "rate_hz",
+            f"is {rate:g}, which leaves a run of {duration:g} s one sample; take {1 / duration:g}"
+            " or more.",
+        )
     for name, sensor in sensors.sensors.items():
         place, own = f"sensors.{name}", sensor.rate_hz or rate
         if name not in offered:

@@ -93,6 +93,10 @@ class SensorSet:
     points: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     source: str = "sensors"
 
+    def samples(self, duration: float) -> int:
+        """How many samples a recording of so many seconds has, the first at its beginning."""
+        return int(np.floor(duration * self.rate_hz + _SAME_INSTANT)) + 1
+
     def noise(self) -> dict[str, float]:
         """Standard deviation by channel in SI, of those that are noisy."""
         return {
@@ -107,11 +111,10 @@ class SensorSet:
 def measured(true: Run, sensors: SensorSet, seed: int, stream: int) -> Run:
     """What the sensors record of a run.
 
-    true : sampled at least as often as the fastest sensor
+    true : sampled at least as often as the fastest sensor, and long enough for two samples
     stream : which run it is among those of one seed
     """
-    count = int(np.floor(true.duration * sensors.rate_hz + _SAME_INSTANT))
-    time = np.arange(count + 1) / sensors.rate_hz
+    time = np.arange(sensors.samples(true.duration)) / sensors.rate_hz
     channels = {
         name: _readings(true, name, sensor, time, sensors.rate_hz, _random(seed, stream, name))
         for name, sensor in sensors.sensors.items()

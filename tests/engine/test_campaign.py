@@ -17,7 +17,7 @@ from ridetune.engine.channels import channel
 from ridetune.engine.errors import CampaignError, Cancelled, MeasurementError
 from ridetune.engine.manoeuvre import manoeuvre_from_json, reference_manoeuvres
 from ridetune.engine.measurement import parse_run
-from ridetune.engine.plant import ConceptPlant
+from ridetune.engine.plant import ConceptPlant, Driven
 from ridetune.engine.recording_files import files_of, files_of_car, names_of
 from ridetune.engine.run_notes import parse_notes
 from ridetune.engine.sensors import RECORDED, Sensor, SensorSet
@@ -103,6 +103,18 @@ def test_a_drive_that_diverges_keeps_its_beginning_and_leaves_the_others_alone()
     assert 1.35 < broken.run.duration < 1.5
     before = simulate_road(CAR, WALL.lasting(1.3)).run
     assert_allclose(broken.run["chassis.z"][: before.time.size], before["chassis.z"], atol=1e-9)
+
+
+def test_a_drive_that_ends_before_a_second_sample_says_why_it_ended():
+    """Oracle: what the plant says; five samples a second are one in 0.1 s."""
+
+    class Stuck(ConceptPlant):
+        def drive(self, manoeuvre, **how):
+            return Driven(super().drive(manoeuvre.lasting(0.1), **how).run, "It broke off.")
+
+    campaign = Campaign.plan(Stuck(CAR), SensorSet(5.0), short("bump"))
+    [found] = drive(campaign)
+    assert (found.run, found.failure) == (None, "It broke off.")
 
 
 def test_a_cancelled_campaign_keeps_what_has_ended():

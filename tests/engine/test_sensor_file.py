@@ -120,6 +120,13 @@ def test_a_delay_as_long_as_the_run_is_refused():
         check(data, duration=6.0)
 
 
+def test_a_rate_that_leaves_one_sample_is_refused():
+    """Oracle: a recording begins with a sample, and the next comes 1/rate later."""
+    check({"rate_hz": 2}, duration=0.5)
+    with pytest.raises(MeasurementError, match=r"rate_hz is 2, .* of 0\.4 s one sample; take 2\.5"):
+        check({"rate_hz": 2}, duration=0.4)
+
+
 def test_a_file_that_cannot_be_read_is_refused(tmp_path):
     path = tmp_path / "s.toml"
     path.write_text("rate_hz = ")
