@@ -57,7 +57,7 @@ def names_of(names: Iterable[str], form: Form) -> list[str]:
 def notes(recording: Recording, campaign: Campaign, date: datetime) -> str:
     """What `read_run` finds beside a recording, and what a person wants to know, as TOML."""
     assert recording.run is not None
-    facts = {name: json.dumps(text) for name, text in _facts(recording, campaign).items()}
+    facts = {name: _quoted(text) for name, text in _facts(recording, campaign).items()}
     facts |= {"date": date.isoformat(), "rate_hz": repr(campaign.sensors.rate_hz)}
     lines = [f"{name} = {value}" for name, value in facts.items()]
     lines += ["", "[noise]"]
@@ -66,6 +66,11 @@ def notes(recording: Recording, campaign: Campaign, date: datetime) -> str:
         lines += ["", f"[sensors.{json.dumps(name)}]"]
         lines += [f"{key} = {value!r}" for key, value in stated.items()]
     return "\n".join([*lines, ""])
+
+
+def _quoted(text: str) -> str:
+    """A text as TOML writes it: as JSON does, but for pairs of escapes and a bare delete."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _facts(recording: Recording, campaign: Campaign) -> dict[str, str]:

@@ -105,7 +105,11 @@ class SensorSet:
 
     def units(self) -> dict[str, str]:
         """Unit by channel, of those with one of their own."""
-        return {name: one.unit for name, one in self.sensors.items() if one.unit is not None}
+        return {
+            name: " ".join(one.unit.split())
+            for name, one in self.sensors.items()
+            if one.unit is not None
+        }
 
 
 def measured(true: Run, sensors: SensorSet, seed: int, stream: int) -> Run:

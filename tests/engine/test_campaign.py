@@ -194,6 +194,15 @@ def test_notes_state_noise_rates_and_filters_and_the_truth_lies_apart():
         assert hidden not in files["manoeuvre_bump.toml"]
 
 
+def test_notes_are_toml_whatever_the_car_is_called():
+    """Oracle: the standard library's reader, which takes no escaped half of a character."""
+    name = 'é "\\" \U0001f697 \x7f\n'
+    campaign = Campaign.plan(ConceptPlant(replace(CAR, name=name)), SensorSet(), short("bump"))
+    [recording] = drive(campaign)
+    files = files_of(recording, campaign, "csv", DATE)
+    assert tomllib.loads(files["manoeuvre_bump.toml"].decode())["vehicle"] == name
+
+
 def test_a_part_is_named_so_and_its_notes_say_why():
     campaign = Campaign.plan(PLANT, SensorSet(), {"wall": WALL})
     [recording] = drive(campaign)

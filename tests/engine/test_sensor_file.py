@@ -68,6 +68,8 @@ def test_noise_is_told_in_the_sensor_s_unit():
     found = sensors_from_json({"sensors": data})
     assert found.noise() == pytest.approx({"chassis.z": 5e-4, "chassis.roll": math.pi / 9000})
     assert found.units() == {"chassis.z": "mm", "chassis.roll": "°"}
+    spaced = sensors_from_json({"sensors": {"chassis.a_x": {"unit": "mm \n s^-2"}}})
+    assert spaced.units() == {"chassis.a_x": "mm s^-2"}
 
 
 def test_noise_alone_is_a_set_of_the_usual_sensors():
