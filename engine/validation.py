@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from .channels import OUTPUT_CHANNELS, Run
-from .errors import Cancelled, ManoeuvreError, ProblemError, SimulationError, VehicleError
+from .errors import Cancelled, ManoeuvreError, ProblemError, RideError, VehicleError
 from .json_record import RecordReader
 from .manoeuvre import Manoeuvre
 from .measurement import missing_for_identification
@@ -204,7 +204,7 @@ def validate(
 
     progress : called with how many predictions of how many are done
     cancelled : polled before each; Cancelled is raised once it is true
-    Raises what `check_cases` does, MeasurementError for rims that cannot drive a car.
+    Raises what `check_cases` does.
     """
     settings = settings or RimsSettings()
     names = check_cases(cases)
@@ -269,7 +269,7 @@ def _predict(
 ) -> Prediction:
     try:
         found = _simulation(vehicle, case, mode, model, traction, settings)
-    except SimulationError as error:
+    except RideError as error:
         return Prediction(mode, model, None, failure=str(error))
     run = _filtered(_at(found.run, case.run.time), settings)
     scores = {

@@ -12,6 +12,7 @@ from ridetune.engine.errors import Cancelled, ManoeuvreError, ProblemError, Vehi
 from ridetune.engine.manoeuvre import reference_manoeuvres
 from ridetune.engine.measurement import read_run
 from ridetune.engine.run_notes import DEFAULT_NOISE
+from ridetune.engine.torque_laws import Deceleration
 from ridetune.engine.validation import (
     Case,
     Geometry,
@@ -128,6 +129,16 @@ def test_a_prediction_that_fails_does_not_end_the_others():
     assert "diverged" in failed.failure
     assert road.failure == ""
     assert road.scores["chassis.z"].rms_error < 1e-3
+
+
+def test_a_manoeuvre_that_the_car_cannot_drive_leaves_the_rims():
+    """It brakes, and neither it nor the car tells how much of that is in front."""
+    brake = Deceleration(2.0, start=15.0)
+    case = replace(twin(1), manoeuvre=replace(reference_manoeuvres()["1"], brake=brake))
+    run = validate(replace(PAPER, brakes=None), [case]).runs[0]
+    for model in ("8dof", "7dof"):
+        assert "has no brakes; give" in prediction(run, "road", model).failure
+        assert prediction(run, "rims", model).failure == ""
 
 
 def test_progress_counts_and_a_cancelled_validation_stops():
