@@ -238,17 +238,24 @@ def validate(
 
 
 def squat_window(run: Run) -> SquatWindow | None:
-    """The later half of the time in which the car accelerates, and the rest before it."""
+    """The later half of the longest time in which the car accelerates, and the rest before it."""
     during = pushes(run).get("squat")
     if during is None or "chassis.pitch" not in run:
         return None
-    time = run.time[during]
-    begin, end = float(time[0]), float(time[-1])
+    begin, end = _longest(run.time, during)
     rest_end = begin - REST_GAP
     rest_begin = max(float(run.time[0]), rest_end - REST_BEFORE)
     if rest_end - rest_begin < LEAST_REST:
         return None
     return SquatWindow((rest_begin, rest_end), (0.5 * (begin + end), end))
+
+
+def _longest(time: Array, during: NDArray[np.bool_]) -> tuple[float, float]:
+    """First and last instant of the longest stretch of samples that are true, of one at least."""
+    edges = np.flatnonzero(np.diff(during.astype(np.int8), prepend=0, append=0))
+    first, last = time[edges[::2]], time[edges[1::2] - 1]
+    longest = np.argmax(last - first)
+    return float(first[longest]), float(last[longest])
 
 
 def _kinds(case: Case) -> list[tuple[Mode, Model]]:

@@ -83,6 +83,16 @@ def test_the_squat_is_read_late_in_the_push_and_long_before_it():
     assert squat_window(still) is None
 
 
+def test_the_squat_of_two_pushes_is_that_of_the_longer():
+    """Oracle: 2 m/s2 from 5 to 9 s, and again from 20 to 22 s; read below 1 Hz, hence 0.2 s."""
+    time = np.arange(3000) * 0.01
+    push = 2.0 * (((time > 5.0) & (time < 9.0)) | ((time > 20.0) & (time < 22.0)))
+    run = Run("two", time, {"chassis.a_x": push, "chassis.pitch": np.zeros(3000)})
+    window = squat_window(run)
+    assert_allclose(window.late, (7.0, 9.0), atol=0.2)
+    assert_allclose(window.rest, (2.5, 4.5), atol=0.2)
+
+
 def test_the_road_of_a_known_manoeuvre_is_shown_class_by_class(validation):
     first, second = validation.runs[1].road
     assert first.begin == pytest.approx(PAPER.front.cg_distance)
