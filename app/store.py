@@ -228,7 +228,10 @@ class Store:
             measurements.c.session == session
         )
         made = size.select_from(jobs.join(job_files).join(uploads)).where(jobs.c.session == session)
-        total = sum(connection.execute(part).scalar_one() for part in (measured, made))
+        driven = select(func.coalesce(func.sum(func.length(measurements.c.manoeuvre)), 0)).where(
+            measurements.c.session == session
+        )
+        total = sum(connection.execute(part).scalar_one() for part in (measured, made, driven))
         if total + more > self.limits.session_bytes:
             raise Busy(
                 f"The session's measurements and sweeps would exceed "
@@ -259,17 +262,27 @@ class Store:
         summary: Mapping[str, Any],
     ) -> Measurement:
         """Keep the noise that is stated of a measurement, and what is found in it with that."""
-        told = {"noise": json.dumps(dict(noise)), "summary": json.dumps(dict(summary))}
-        return self._set_of(session, measurement, **told)
+        return self._set_of(
+            session,
+            measurement,
+            noise=json.dumps(dict(noise)),
+            summary=json.dumps(dict(summary)),
+        )
 
     def set_manoeuvre(
         self, session: str, measurement: str, manoeuvre: Mapping[str, Any] | None
     ) -> Measurement:
-        """Keep what was driven in a measurement, None where it is not known."""
-        return self._set_of(session, measurement, manoeuvre=_optional(manoeuvre))
+        """Keep what was driven in a measurement, None where it is not known; `Busy` as of files."""
+        text = _optional(manoeuvre)
+        return self._set_of(session, measurement, more=len(text or ""), manoeuvre=text)
 
-    def _set_of(self, session: str, measurement: str, **values: Any) -> Measurement:
+    def _set_of(
+        self, session: str, measurement: str, *, more: int = 0, **values: Any
+    ) -> Measurement:
+        """Change some columns of a measurement, which take so many bytes more."""
         with self.database.writing() as connection:
+            if more:
+                self._require_room(connection, session, more)
             connection.execute(
                 update(measurements)
                 .where(measurements.c.session == session, measurements.c.id == measurement)

@@ -306,6 +306,21 @@ def test_files_of_jobs_take_their_share_of_the_session(tmp_path):
     store.close()
 
 
+def test_manoeuvres_take_their_share_of_the_session(tmp_path):
+    """Oracle: {"name": "..."} has 12 characters besides the name."""
+    store = Store(tmp_path, Limits(session_bytes=100))
+    session, _ = store.create_session(CAR, [])
+    one, other = (store.add_measurement(session, recording(b"12345")) for _ in range(2))
+    store.set_manoeuvre(session, one.id, {"name": "x" * 68})
+    store.require_room(session, 10)
+    with pytest.raises(Busy, match="delete one first"):
+        store.set_manoeuvre(session, other.id, {"name": ""})
+    assert store.measurement(session, other.id).manoeuvre is None
+    store.set_manoeuvre(session, one.id, None)
+    store.set_manoeuvre(session, other.id, {"name": ""})
+    store.close()
+
+
 def test_a_restart_takes_running_jobs_back_and_counts_it_apart(store, session):
     job = queued(store, session)
     store.jobs.start(job)
