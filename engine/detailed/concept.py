@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import SimulationError
 from ..frames import AXLES, AxleName, axle_of
 from ..vehicle import (
     Axle,
@@ -34,6 +35,9 @@ from .side_view import around, clamped
 Array = NDArray[np.float64]
 
 SOURCE = "Known data of the detailed car; suspension, bar and pivot are a first guess."
+
+OFF_CG = 1e-3
+"""m: the measured point lies this close to the sprung mass's CG."""
 
 FIRST_GUESS = {
     "front": {
@@ -65,10 +69,16 @@ class Parts:
 def known_vehicle(car: DetailedCar) -> Vehicle:
     """Masses, geometry, tyres and drive of a car with first guesses of its suspension.
 
-    Its CG is the car's measured point. Raises SimulationError where Exudyn is missing or the car
-    does not stand.
+    Raises SimulationError where Exudyn is missing, the car does not stand, or its measured point is
+    not the sprung mass's CG.
     """
     parts = cut(car)
+    if np.linalg.norm(parts.sprung.cg - car.measured_point) > OFF_CG:
+        place = ", ".join(f"{value:.4f}" for value in parts.sprung.cg)
+        raise SimulationError(
+            f"{car.name}: the CG of the sprung mass is at [{place}], which measured_point must be;"
+            " write that into the car's file."
+        )
     (xx, _, xz), (_, yy, _), (_, _, zz) = parts.sprung.inertia
     vehicle = Vehicle(
         name=car.name,
@@ -140,5 +150,6 @@ def _axle(car: DetailedCar, name: AxleName, parts: Parts) -> Axle:
         wheel=Wheel(corner.mass, float(z), Inertia3(*np.diag(corner.inertia).tolist())),
         tyre=Tyre(tyre.stiffness, tyre.damping, tyre.rolling_resistance),
         driven=any(wheel.driven_against for wheel in wheels),
+        torque_reaction="arm" if any(w.driven_against == w.carrier for w in wheels) else "chassis",
         **FIRST_GUESS[name],
     )

@@ -206,8 +206,8 @@ class _Drive:
         return True
 
     def _torques(self, time: float) -> tuple[Array, Array]:
-        """Drive and brake torques (4,) that are asked for at a time, N m."""
-        drive, brake = self._demand.drive.at(time), self._demand.brake.at(time)
+        """Drive and brake torques (4,) that are asked for up to a time, N m."""
+        drive, brake = (one.at(time, "left") for one in (self._demand.drive, self._demand.brake))
         return drive[self._columns], brake[self._columns]
 
     def _motion(self, ahead: float = 0.0) -> WheelMotion:

@@ -8,10 +8,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from ridetune.engine.campaign import Campaign
 from ridetune.engine.campaign_run import drive
 from ridetune.engine.detailed.car_file import reference_car
-from ridetune.engine.detailed.concept import cut
+from ridetune.engine.detailed.concept import cut, known_vehicle
 from ridetune.engine.detailed.plant import DetailedPlant
 from ridetune.engine.equilibrium import loads_at_rest
-from ridetune.engine.errors import Cancelled
+from ridetune.engine.errors import Cancelled, SimulationError
 from ridetune.engine.manoeuvre import Manoeuvre
 from ridetune.engine.sensors import RECORDED, SensorSet
 from ridetune.engine.torque_laws import DriveTable
@@ -48,6 +48,21 @@ def test_the_known_car_has_the_masses_of_a_car_cut_by_hand():
         strict=True,
     ):
         assert found == pytest.approx(by_hand, rel=0.01)
+
+
+def test_a_measured_point_off_the_cg_is_refused_with_the_right_one():
+    with pytest.raises(SimulationError, match=r"CG of the sprung mass is at \[-1\.24.*0\.525"):
+        known_vehicle(replace(CAR, measured_point=(-1.0, 0.0, 0.6)))
+
+
+def test_a_torque_held_by_the_carrier_is_one_on_the_arm():
+    """Oracle: an inboard motor's reaction is the chassis's, a hub motor's the carrier's."""
+    hubs = tuple(
+        replace(wheel, driven_against=wheel.driven_against and wheel.carrier)
+        for wheel in CAR.wheels
+    )
+    assert PLANT.vehicle.rear.torque_reaction == "chassis"
+    assert known_vehicle(replace(CAR, wheels=hubs)).rear.torque_reaction == "arm"
 
 
 @pytest.fixture(scope="module")
