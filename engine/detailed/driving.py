@@ -6,7 +6,10 @@ tyres go with the velocities expected at its end: with those of its beginning, f
 that stands rocks itself up on its tyres.
 """
 
-from collections.abc import Callable
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import MappingProxyType
 from typing import Any
 
@@ -104,6 +107,27 @@ def _samples_every(step: float, sample_step: float) -> int:
     return every
 
 
+@contextmanager
+def _interrupts_kept(arrived: list[int]) -> Iterator[None]:
+    """Signals that would raise in the midst of Exudyn, which answers with an error of its own, are
+    kept and raised again at the end.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    handlers = {number: handler for number, handler in handlers.items() if callable(handler)}
+    for number in handlers:
+        signal.signal(number, lambda number, frame: arrived.append(number))
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        for number in arrived:
+            signal.raise_signal(number)
+
+
 class _Drive:
     """One run of a model that stands at rest."""
 
@@ -132,6 +156,7 @@ class _Drive:
         self._offset = np.array([model.in_body(w.body, w.centre)[2] for w in car.wheels])
         self._done = 0
         self._failure: BaseException | None = None
+        self._interrupts: list[int] = []
         self._lost: str | None = None
         self.histories = Histories(model, self._steps // every + 1, every * step, points)
 
@@ -140,12 +165,13 @@ class _Drive:
         model, system = self._model, self._model.system
         self._start()
         system.SetPreStepUserFunction(self._before_step)
-        try:
-            system.SolveDynamic(self._settings())
-            if self._failure is None and self._lost is None:
-                self._sample(self._motion())
-        except model.exudyn.ExudynError:
-            self._lost = self._lost or self.histories.farthest_astray()[0]
+        with _interrupts_kept(self._interrupts):
+            try:
+                system.SolveDynamic(self._settings())
+                if self._failure is None and self._lost is None:
+                    self._sample(self._motion())
+            except model.exudyn.ExudynError:
+                self._lost = self._lost or self.histories.farthest_astray()[0]
         if self._failure is not None:
             raise self._failure
         if self._lost is not None:
@@ -181,6 +207,8 @@ class _Drive:
 
         An exception must not pass through Exudyn: it is kept and raised afterwards.
         """
+        if self._interrupts:
+            return False
         try:
             return self._set_forces(system, end)
         except BaseException as failure:

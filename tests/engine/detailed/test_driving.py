@@ -1,5 +1,6 @@
 """The detailed car driven: against closed forms, conservation and the paper's figures."""
 
+import signal
 from dataclasses import replace
 
 import numpy as np
@@ -159,6 +160,17 @@ def test_a_run_that_diverges_names_time_and_body_and_keeps_its_part():
     assert "\n" not in str(lost.value)
     assert lost.value.partial is not None
     assert lost.value.partial.time[-1] <= lost.value.time + 1e-9
+
+
+def test_an_interrupt_is_one_however_deep_in_exudyn_it_arrives():
+    """Raised inside a callback of Exudyn's it would come out as an error of that."""
+    kept = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            drive(CAR, push(300.0), progress=lambda share: signal.raise_signal(signal.SIGINT))
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, kept)
 
 
 def test_it_stops_when_told_to():
