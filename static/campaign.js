@@ -16,7 +16,7 @@ const parts = {};
 /** What was wrong with the last request, a sentence. */
 let problem = "";
 const { now: current, busy, start: send, resume: takeUp, cancel } =
-  jobs("campaigns", "campaign", { changed: show, ended });
+  jobs("campaigns", "campaign", { changed, ended });
 
 export { current };
 
@@ -79,6 +79,12 @@ async function useCar() {
   } catch (error) {
     refused(error, "Reading the car");
   }
+}
+
+/** What became of it is brought into view, below a form that fills the panel. */
+function changed() {
+  show();
+  if (parts.outcome.childElementCount) parts.outcome.scrollIntoView({ block: "nearest" });
 }
 
 function show() {

@@ -210,9 +210,18 @@ function fillSpectrum({ plot, factor }, runs, channel) {
   const keep = first.frequency.map((f, i) => i).filter((i) => first.frequency[i] <= FREQUENCIES[1]);
   plot.setData([
     keep.map((i) => first.frequency[i]),
-    ...spectra.map((s) => keep.map((i) =>
-      s && s.frequency.length === first.frequency.length ? s.density[i] * factor : null)),
+    ...spectra.map((s) => keep.map((i) => s && densityAt(s, first.frequency[i], factor))),
   ]);
+}
+
+/** Between the frequencies of a spectrum, which are the multiples of the first; null beyond them. */
+function densityAt({ frequency, density: found }, f, factor) {
+  const place = f / frequency[0] - 1;
+  const i = Math.round(place);
+  if (Math.abs(place - i) < 1e-6) return i < found.length ? found[i] * factor : null;
+  const low = Math.floor(place);
+  if (low < 0 || low + 1 >= found.length) return null;
+  return ((low + 1 - place) * found[low] + (place - low) * found[low + 1]) * factor;
 }
 
 /** Lines on the shown grid, kept per run: a slider changes one run of three. */

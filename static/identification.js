@@ -7,7 +7,7 @@ import * as free from "./free.js";
 import { jobs } from "./job.js";
 import { notice } from "./notices.js";
 import * as noise from "./noise.js";
-import { brakingOf, rimsOf } from "./preparation.js";
+import { brakingOf, ready, rimsOf } from "./preparation.js";
 import * as result from "./result.js";
 import * as setup from "./setup.js";
 import { get, on, set } from "./store.js";
@@ -81,7 +81,7 @@ async function request() {
 }
 
 async function start() {
-  if (!await send(request)) return;
+  if (!ready() || !await send(request)) return;
   view = "fit";
   show();
 }

@@ -86,6 +86,7 @@ async function add(files) {
   }
   parts.busy = null;
   show();
+  $(".problem", parts.list)?.scrollIntoView({ block: "nearest" });
 }
 
 async function take(file) {

@@ -78,6 +78,13 @@ export function brakingField(run) {
   return field;
 }
 
+/** Whether every mark can be read; the first that cannot says so. */
+export function ready() {
+  const wrong = document.querySelector("input.braking:invalid");
+  wrong?.reportValidity();
+  return !wrong;
+}
+
 const written = (intervals) =>
   intervals.length ? intervals.map((interval) => interval.join("-")).join(", ") : "none";
 

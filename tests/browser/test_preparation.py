@@ -53,6 +53,9 @@ def test_braking_is_marked_run_by_run(visitor):
     field = visitor.page.get_by_label(when)
     assert "begin-end in seconds" in field.evaluate("(field) => field.validationMessage")
     assert visitor.look("ridetune.state('braking')") == {}
+    visitor.click("#start")
+    assert field.input_value() == "soon"
+    assert visitor.look("ridetune.job()") is None
     change(visitor, when, "6.2-9.8, 12 to 14")
     visitor.wait(
         lambda: "has no brakes" in visitor.element("#chart-note").inner_text(), "it is told"
@@ -124,3 +127,15 @@ def test_notes_without_their_recording_are_explained(visitor):
         visitor.wait(lambda: problem.is_visible() and name in problem.inner_text(), "it is refused")
         assert said in problem.inner_text()
     assert visitor.look("ridetune.state('measurements').length") == 2
+
+
+def test_a_seat_s_spectra_share_an_axis_though_they_are_sampled_apart(visitor):
+    """Oracle: the baseline is the same car; each line reaches over the whole axis."""
+    visitor.page.get_by_role("tab", name="Seat").click()
+    name = "spectrum of seat.driver.a_z"
+    runs = ("measured", "reference", "now")
+    visitor.wait(
+        lambda: all(np.isfinite(visitor.line(name, run)).mean() > 0.9 for run in runs),
+        "three spectra are drawn",
+    )
+    np.testing.assert_array_equal(visitor.line(name, "reference"), visitor.line(name, "now"))
