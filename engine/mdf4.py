@@ -7,7 +7,7 @@ from importlib.util import find_spec
 
 from .channels import Run, channel
 from .errors import MeasurementError
-from .units import to_si
+from .measurement import in_unit
 
 
 def missing_asammdf() -> str:
@@ -36,9 +36,7 @@ def run_to_mdf4(
 
     signals = []
     for name in run.columns:
-        si = channel(name).unit
-        unit = units.get(name, si)
-        values = run[name] / to_si(unit, si)[0]
+        values, unit = in_unit(run, name, units)
         signals.append(Signal(values, run.time, name=name, unit=unit, comment=_said(name)))
     with MDF(version="4.10") as file:
         file.start_time = date

@@ -82,17 +82,19 @@ def run_to_csv(run: Run, units: Mapping[str, str] = MappingProxyType({})) -> str
 
     units : by channel, of those that are not to be in SI
     """
-    columns = {"time": run.time, **{name: run[name] for name in run.columns}}
-    titles, values = [], []
-    for name, si in columns.items():
-        unit = units.get(name, channel(name).unit)
-        factor, _ = to_si(unit, channel(name).unit)
-        titles.append(f"{name} [{unit}]")
-        values.append(si / factor)
-    table = np.column_stack(values)
+    shown = {name: in_unit(run, name, units) for name in ("time", *run.columns)}
+    titles = [f"{name} [{unit}]" for name, (_, unit) in shown.items()]
+    table = np.column_stack([values for values, _ in shown.values()])
     # A time counted from 1970 in seconds takes ten digits before the point.
     row = ",".join(["%.15g"] + ["%.12g"] * len(run.columns))
     return "\n".join([",".join(titles), *(row % tuple(values) for values in table.tolist()), ""])
+
+
+def in_unit(run: Run, name: str, units: Mapping[str, str]) -> tuple[NDArray[np.float64], str]:
+    """The time or a channel (n,) of a run in its unit, SI where none is told, and that unit."""
+    si = channel(name).unit
+    unit = units.get(name, si)
+    return (run.time if name == "time" else run[name]) / to_si(unit, si)[0], unit
 
 
 def missing_for_identification(run: Run) -> tuple[str, ...]:
