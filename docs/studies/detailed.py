@@ -11,7 +11,7 @@ seen, by damper and bounds. Pivots: by the runs that are fitted, beside those of
 from pathlib import Path
 
 import numpy as np
-from ridetune.engine.channels import Run
+from ridetune.engine.channels import OUTPUT_CHANNELS, Run
 from ridetune.engine.fit import Fit
 from ridetune.engine.identification import Problem, identify
 from ridetune.engine.measurement import read_run
@@ -28,7 +28,6 @@ WIDE = {
     "front.stabilizer_bar.damping": (0.0, 1e5),
     "rear.stabilizer_bar.damping": (0.0, 1e4),
 }
-OUTPUTS = ("chassis.z", "chassis.pitch", "chassis.roll")
 PIVOTS = [f"{axle}.pivot.{what}" for axle in ("front", "rear") for what in ("distance", "angle")]
 
 
@@ -63,7 +62,7 @@ def honesty(problems: list[Problem], fits: list[Fit]) -> None:
 def percents(fit: Fit, run: Run) -> str:
     """Fit percent of z, pitch and roll."""
     found = simulate_rims(fit.vehicle, run).fit_percent
-    return ", ".join(f"{found[name]:.1f}" for name in OUTPUTS)
+    return ", ".join(f"{found[name]:.1f}" for name in OUTPUT_CHANNELS)
 
 
 def prediction(vehicle: Vehicle, seen: Run, unseen: Run) -> None:

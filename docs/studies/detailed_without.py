@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from ridetune.engine.campaign import Campaign, chosen, roughened
-from ridetune.engine.channels import Run
+from ridetune.engine.channels import OUTPUT_CHANNELS, Run
 from ridetune.engine.detailed.car_file import reference_car
 from ridetune.engine.detailed.plant import DetailedPlant
 from ridetune.engine.detailed.records import BushingLaw, DetailedCar, Strut
@@ -19,7 +19,6 @@ from ridetune.engine.parameters import ALL_NAMES, PARAMETER_NAMES
 from ridetune.engine.sensors import SensorSet
 from ridetune.engine.simulation import simulate_rims
 
-OUTPUTS = ("chassis.z", "chassis.pitch", "chassis.roll")
 FAR = 0.9
 """m, gap of a stop that is never reached."""
 HARDLY_BENT = 50.0
@@ -113,7 +112,7 @@ def main() -> None:
         for names in (PARAMETER_NAMES, ALL_NAMES):
             fit = identify(Problem.build(plant.vehicle, [seen], names))
             percent = simulate_rims(fit.vehicle, unseen).fit_percent
-            told.append(", ".join(f"{percent[name]:.1f}" for name in OUTPUTS))
+            told.append(", ".join(f"{percent[name]:.1f}" for name in OUTPUT_CHANNELS))
         print(f"| {title} | {' | '.join(told)} |", flush=True)
 
 
