@@ -14,7 +14,7 @@ def missing_asammdf() -> str:
     """What to do where MDF4 cannot be written for want of a package, a sentence; else empty."""
     if find_spec("asammdf") is not None:
         return ""
-    return "MDF4 needs asammdf, which is not installed; install ridetune[mdf], or take CSV."
+    return "MDF4 needs asammdf, which is not installed; install ridetune[formats], or take CSV."
 
 
 def require_asammdf() -> None:
