@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .braking import Interval
+from .problem import FreeParameter
 from .rims_settings import RimsSettings
+from .uncertainty import Uncertainty
 from .vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -57,7 +59,9 @@ CONVERGED = (Outcome.DETERMINED, Outcome.WEAKLY, Outcome.AT_BOUND, Outcome.UNDET
 class ParameterEstimate:
     """One identified parameter, SI.
 
-    std_error, confidence_interval : infinite where the runs do not determine the parameter
+    std_error : infinite where the runs do not determine the parameter
+    confidence_interval : 95 %, an end infinite where the runs leave it open: on both sides of a
+        parameter that they do not determine, beyond a bound at which the search ended
     determined : "yes" (95 % half-width under 15 % of |value|), "weakly" (under 50 %) or "no"
         (wider, or at a bound, or when the fit did not converge to the runs)
     """
@@ -72,6 +76,11 @@ class ParameterEstimate:
     upper: float
     at_bound: bool
     determined: str
+
+    @property
+    def free(self) -> FreeParameter:
+        """What was free, with the search's variable."""
+        return FreeParameter(self.name, self.start, self.lower, self.upper)
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +117,7 @@ class Fit:
 
     vehicle : with the identified values
     cost : half the sum of squared residuals, in units of the noise
-    correlation : (n, n) of the parameters in their order; not a number where undetermined
+    errors : of the search's variables, those of `FreeParameter`, in the parameters' order
     fit_percent : by run and channel
     residuals : by run and channel, (samples,) model minus measured, SI
     cost_history : the best cost after each evaluation
@@ -117,7 +126,7 @@ class Fit:
     vehicle: Vehicle
     parameters: tuple[ParameterEstimate, ...]
     cost: float
-    correlation: Array
+    errors: Uncertainty
     fit_percent: Mapping[str, Mapping[str, float]]
     residuals: Mapping[str, Mapping[str, Array]]
     outcome: Outcome
@@ -132,7 +141,7 @@ class Fit:
     runs: tuple[FittedRun, ...]
 
 
-def determined(value: float, half_width: float, at_bound: bool) -> str:
+def determined(value: float, half_width: float, at_bound: bool = False) -> str:
     """ "yes", "weakly" or "no"."""
     if at_bound or not half_width < WEAKLY_BELOW * abs(value):
         return "no"

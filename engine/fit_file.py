@@ -20,7 +20,10 @@ def fit_to_json(fit: Fit) -> dict[str, Any]:
         {
             "vehicle": vehicle_to_json(fit.vehicle),
             "parameters": [_parameter(one) for one in fit.parameters],
-            "correlation": fit.correlation.tolist(),
+            "correlation": fit.errors.correlation.tolist(),
+            "covariance": fit.errors.covariance.tolist(),
+            "unknown": fit.errors.unknown.tolist(),
+            "quantile": fit.errors.quantile,
             "outcome": str(fit.outcome),
             "converged": fit.converged,
             "warnings": list(fit.warnings),

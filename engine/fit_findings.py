@@ -182,7 +182,7 @@ def undetermined_findings(estimates: Sequence[ParameterEstimate], errors: Uncert
         if one.at_bound or one.determined != "no":
             continue
         partner = _partner(errors, k)
-        if not _excited(one, errors, k):
+        if not _excited(errors, k):
             unexcited.append(one.name)
         elif partner is None:
             unknown.append(one.name)
@@ -219,9 +219,9 @@ def _at_bound(one: ParameterEstimate) -> str:
     return f"{said}; widen the bound or fix the parameter."
 
 
-def _excited(one: ParameterEstimate, errors: Uncertainty, k: int) -> bool:
+def _excited(errors: Uncertainty, k: int) -> bool:
     """Whether the runs would determine the parameter if all others were known."""
-    return bool(errors.alone[k] < UNEXCITED * max(abs(one.value), abs(one.start)))
+    return bool(errors.quantile * errors.alone[k] < UNEXCITED)
 
 
 def _partner(errors: Uncertainty, k: int) -> int | None:

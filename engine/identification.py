@@ -6,6 +6,7 @@ trust-region reflective method of scipy (`least_squares`, trf) on scaled paramet
 tells what the paper's campaign can and cannot determine.
 """
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -33,7 +34,7 @@ from .parameters import parameter
 from .problem import ComparedRun, FreeParameter, Problem
 from .residuals import FAILED_TRIAL, Residuals, Simulate
 from .simulation import fit_percent, rims_batch
-from .uncertainty import Uncertainty, uncertainty
+from .uncertainty import DIRECTION_TOLERANCE, Uncertainty, information, uncertainty
 
 __all__ = ["Fit", "FreeParameter", "Outcome", "Problem", "Progress", "identify"]
 
@@ -97,6 +98,11 @@ class _Search:
         self.slopes = self.residuals.jacobian(x)
         return condensed_jacobian(self.residuals.vector(x), self.slopes)
 
+    def beyond(self, x: Array) -> Array:
+        """Where the search would go on to from its solution x were there no bounds."""
+        r = self.residuals.vector(x)
+        return x - np.linalg.lstsq(self.slopes, r, rcond=DIRECTION_TOLERANCE)[0]
+
     def _state(self) -> Progress:
         x, r = self._best
         problem = self.residuals.problem
@@ -155,13 +161,8 @@ def identify(
         else most_evaluations,
     )
     r = residuals.vector(solution.x)
-    places = [block.place for block in residuals.blocks()]
-    slopes = [one.slope(float(x)) for one, x in zip(problem.free, solution.x, strict=True)]
-    jacobian = search.slopes / np.array(slopes)
-    scale = np.array([one.scale for one in problem.free])
-    errors = uncertainty([(r[place], jacobian[place]) for place in places], scale)
-    values = problem.values(solution.x)
-    estimates = _estimates(problem, values, errors)
+    errors = uncertainty(information(residuals.of_runs(r, search.slopes)))
+    estimates = _estimates(problem, solution.x, errors, beyond=search.beyond(solution.x))
     fitted = residuals.model(solution.x)
     driven = _well_driven(problem)
     faults = channel_faults(driven, start, fitted)
@@ -188,7 +189,7 @@ def identify(
         vehicle=problem.vehicle_at(solution.x),
         parameters=estimates,
         cost=float(solution.cost),
-        correlation=errors.correlation,
+        errors=errors,
         fit_percent=_percents(residuals, r),
         residuals=_histories(residuals, r),
         outcome=outcome,
@@ -283,25 +284,35 @@ def _failure(problem: Problem) -> str:
 
 
 def _estimates(
-    problem: Problem, values: Array, errors: Uncertainty
+    problem: Problem, x: Array, errors: Uncertainty, *, beyond: Array
 ) -> tuple[ParameterEstimate, ...]:
+    """The parameters; at a bound nobody has looked further, so the interval is open there and, on
+    this side, reaches to where it would around the point that lies beyond.
+    """
     found = []
-    for one, value, deviation, half_width in zip(
-        problem.free, values.tolist(), errors.std_error, errors.half_width, strict=True
+    for one, variable, further, deviation in zip(
+        problem.free, x.tolist(), beyond.tolist(), errors.std_error.tolist(), strict=True
     ):
+        value = one.value(variable)
         at_bound = min(value - one.lower, one.upper - value) < AT_BOUND * (one.upper - one.lower)
+        below = above = errors.quantile * deviation
+        if at_bound and variable < 0.5 * sum(map(one.variable, (one.lower, one.upper))):
+            below, above = math.inf, max(0.0, further - variable + above)
+        elif at_bound:
+            below, above = max(0.0, variable - further + below), math.inf
+        interval = one.interval(variable, below, above)
         found.append(
             ParameterEstimate(
                 name=one.name,
                 value=value,
                 unit=parameter(one.name).unit,
-                std_error=float(deviation),
-                confidence_interval=(value - float(half_width), value + float(half_width)),
+                std_error=abs(one.slope(variable)) * deviation,
+                confidence_interval=interval,
                 start=one.start,
                 lower=one.lower,
                 upper=one.upper,
                 at_bound=at_bound,
-                determined=determined(value, float(half_width), at_bound),
+                determined=determined(value, 0.5 * (interval[1] - interval[0]), at_bound),
             )
         )
     return tuple(found)

@@ -34,6 +34,9 @@ MOVES = 1.2
 FAST = 5.0
 """Frequency, Hz, above which a channel shows its noise."""
 
+FARTHEST = 1e3
+"""Factor from a value to the end of its interval beyond which the end is not worth telling."""
+
 SENSORS_BEST = 0.02
 """Share of the default noise below which no sensor's own noise is taken to lie."""
 
@@ -70,6 +73,21 @@ class FreeParameter:
     def slope(self, variable: float) -> float:
         """d value / d variable."""
         return self.value(variable) if self.logarithmic else self.scale
+
+    def interval(self, variable: float, below: float, above: float) -> tuple[float, float]:
+        """Values from so far below a variable to so far above it, bounds aside. An end is infinite
+        where it is, or where the logarithm puts it a factor FARTHEST or more away.
+        """
+        low, high = self._end(variable, -below), self._end(variable, above)
+        return (low, high) if low < high else (high, low)
+
+    def _end(self, variable: float, change: float) -> float:
+        if not self.logarithmic:
+            return (variable + change) * self.scale
+        sign = math.copysign(1.0, self.lower)
+        if abs(change) > math.log(FARTHEST):
+            return sign * change * math.inf
+        return sign * math.exp(variable + change) * self.scale
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,6 +35,7 @@ from .problem import Problem
 from .rims import RimsInputs
 from .simulation import Traction
 from .stability import check_rims_step
+from .uncertainty import RunResiduals
 
 Array = NDArray[np.float64]
 Simulate = Callable[[Array, RimsInputs, Traction], Array]
@@ -110,6 +111,23 @@ class Residuals:
                 place = slice(begin, begin + len(measured))
                 found.append(Block(seen.name, channel, place, measured, seen.noise[channel]))
                 begin += len(measured)
+        return found
+
+    def of_runs(self, r: Array, jacobian: Array) -> list[RunResiduals]:
+        """Residuals and Jacobian, all blocks above each other, run by run."""
+        found, begin = [], 0
+        for seen in self.problem.runs:
+            channels, samples = len(seen.measured), len(seen.inputs.time)
+            place = slice(begin, begin + channels * samples)
+            time = seen.inputs.time
+            found.append(
+                RunResiduals(
+                    r[place].reshape(channels, samples),
+                    jacobian[place].reshape(channels, samples, -1),
+                    float(time[-1] - time[0]) / (samples - 1),
+                )
+            )
+            begin = place.stop
         return found
 
     def model(self, x: Array) -> dict[str, dict[str, Array]]:

@@ -1,32 +1,45 @@
 """How well a least-squares fit knows its parameters.
 
-Residuals r (in units of the assumed noise) come in blocks, one a run and channel; J is their
-derivative at the solution x. With B = (J^T J)^-1 the parameters' covariance is
+Residuals r (in units of the assumed noise) come run by run, channel by channel; J is their
+derivative at the solution by the search's variables x. With B = (J^T J)^-1 their covariance is
 
-    C = B M B,    M = sum over blocks of J_b^T G_b J_b,
+    C = B M B,    M = sum over runs and pairs of channels a, b of J_a^T G_ab J_b,
 
-where G_b is the autocovariance matrix of the block's residuals: white residuals of variance s^2
-give M = s^2 J_b^T J_b and, with one s for all blocks, the textbook s^2 (J^T J)^-1. Estimating G_b
-block by block keeps the errors honest when a channel's noise was stated wrong and when residuals
-are not noise at all but a slow misfit of the model, which the textbook formula takes for thousands
-of independent samples.
+where G_ab is the (cross-)covariance matrix of two channels' residuals: white residuals of variance
+s^2 give M = s^2 J^T J and with it the textbook's s^2 (J^T J)^-1. Estimating G from the residuals
+keeps the errors honest when a channel's noise was stated wrong, when the residuals are a slow
+misfit of the model, which the textbook takes for thousands of independent samples, and when they
+stem from noise in what drives the model: that of a wheel or of a_x goes through the car and comes
+out in z, pitch and roll at once, as slow as the body moves.
 
-G_b is Toeplitz, from the sample autocovariances g_k with Bartlett weights 1 - k/m
-(Newey & West, Econometrica 55, 1987); the bandwidth m follows the lag-one correlation p of the
-block (Andrews, Econometrica 59, 1991):
+G_ab is Toeplitz, from the sample covariances g_ab(k) at lag k with Bartlett weights 1 - |k|/m
+(Newey & West, Econometrica 55, 1987). The bandwidth m of a run is the longest of its channels' by
+their lag-one correlation p (Andrews, Econometrica 59, 1991),
 
     m = 1.1447 (a N)^(1/3),    a = 4 p^2 / ((1 - p)^2 (1 + p)^2),
 
-so that white residuals keep one or two lags and slow ones whole seconds. Residuals so correlated
-count for fewer samples, N_b = N / sum w_k^2 (g_k/g_0)^2 over all lags of both signs, and C is
-multiplied by N_eff / (N_eff - n): for white residuals chi-square over its degrees of freedom.
+and at least BODY_MEMORY: noise of the inputs is hidden from p by the white noise of the outputs,
+which is larger but has little power where the body moves. m is at most a quarter of the run.
 
-Directions which the runs do not move at all are found in the singular value decomposition of J with
-columns scaled by the parameters' scales: s_i <= DIRECTION_TOLERANCE s_max, or s_i <=
-LEAST_EFFECT. A parameter with a part in such a direction has an infinite standard error.
+What a fit has taken out of the residuals lies where J has its power. From white noise of variance
+s^2 it leaves, with the hat matrix H = J B J^T,
+
+    E g_aa(k) = s^2 (delta_k - tr_k(H_aa) / N),    tr_k the sum along the k-th diagonal,
+
+so the spectrum of g_aa is divided by that of the bracket, that of g_ab by the root of both
+channels'. Summed over all frequencies this is the textbook's N - n in place of N.
+
+Intervals take Student's t with the degrees of freedom of M, 3 N/m a run (Bartlett's window;
+Priestley, Spectral Analysis and Time Series, 1981, table 6.2), or with those of the residuals,
+where they are fewer: correlated ones count for N / sum w_k^2 (g_k/g_0)^2 samples, over lags of both
+signs.
+
+Directions which the runs do not move at all are found in the singular value decomposition of J:
+s_i <= DIRECTION_TOLERANCE s_max, or s_i <= LEAST_EFFECT. A parameter with a part in such a
+direction has an infinite standard error.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,106 +56,223 @@ DIRECTION_TOLERANCE = 1e-7
 of the differences that make J."""
 
 LEAST_EFFECT = 1e-3
-"""Change of |r| by a change of all of its scale, from which a direction has any effect on the runs:
-a thousandth of one sample's noise, over the whole campaign."""
+"""Change of |r| by a step of 1 in x, from which a direction has any effect on the runs: a
+thousandth of one sample's noise, over the whole campaign."""
 
 PART_OF_DIRECTION = 1e-3
 """Component of a unit direction from which a parameter counts as part of it."""
+
+BODY_MEMORY = 1.0
+"""Lags over which residuals may always be correlated, s: a period of the body on its springs."""
+
+LEAST_LEFT = 0.1
+"""Share of a spectrum that a fit leaves at least: below, too little is left to extrapolate from."""
 
 CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True, slots=True)
+class RunResiduals:
+    """One run's residuals at the solution.
+
+    residuals : (channels, samples);  jacobian : (channels, samples, n)
+    step : mean time between samples, s
+    """
+
+    residuals: Array
+    jacobian: Array
+    step: float
+
+
+@dataclass(frozen=True, slots=True)
+class Information:
+    """What runs say of n parameters; that of several runs is the sum.
+
+    root : (n, n) triangle R with R^T R = J^T J
+    scatter : (n, n) M
+    samples : effective number of them
+    freedom : degrees of freedom of M
+    """
+
+    root: Array
+    scatter: Array
+    samples: float
+    freedom: float
+
+    def __add__(self, other: "Information") -> "Information":
+        """What both say together."""
+        return Information(
+            triangle(np.concatenate([self.root, other.root])),
+            self.scatter + other.scatter,
+            self.samples + other.samples,
+            self.freedom + other.freedom,
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Uncertainty:
-    """Errors of n parameters.
+    """Errors of n variables x.
 
-    std_error : (n,) infinite where undetermined
-    half_width : (n,) of the 95 % interval
-    alone : (n,) the half-width were all other parameters known
-    correlation : (n, n) not a number in rows and columns of undetermined parameters, diagonal 1
+    covariance : (n, n) over the directions which the runs determine
+    unknown : (k, n) unit directions which they do not
+    quantile : half-widths of 95 % intervals over standard errors
+    alone : (n,) the standard errors were all other variables known
     """
 
-    std_error: Array
-    half_width: Array
+    covariance: Array
+    unknown: Array
+    quantile: float
     alone: Array
-    correlation: Array
+
+    @property
+    def std_error(self) -> Array:
+        """(n,) infinite where undetermined."""
+        return np.array([self.error_of(axis) for axis in np.eye(len(self.covariance))])
+
+    @property
+    def half_width(self) -> Array:
+        """(n,) of the 95 % intervals."""
+        return self.quantile * self.std_error
+
+    @property
+    def correlation(self) -> Array:
+        """(n, n) not a number in rows and columns of undetermined variables, diagonal 1."""
+        errors = self.std_error
+        with np.errstate(invalid="ignore", divide="ignore"):
+            correlation = self.covariance / np.outer(errors, errors)
+        lost = np.isinf(errors)
+        correlation[lost, :] = correlation[:, lost] = np.nan
+        np.fill_diagonal(correlation, 1.0)
+        return correlation
+
+    def error_of(self, gradient: Array) -> float:
+        """Standard error of a quantity whose derivative by x is `gradient` (n,); infinite where it
+        has a part in an unknown direction.
+        """
+        size = float(np.linalg.norm(gradient))
+        if size > 0.0 and np.any(np.abs(self.unknown @ gradient) > PART_OF_DIRECTION * size):
+            return np.inf
+        return float(np.sqrt(max(gradient @ self.covariance @ gradient, 0.0)))
 
 
-def uncertainty(blocks: Sequence[tuple[Array, Array]], scale: Array) -> Uncertainty:
-    """Standard errors, intervals and correlations at a least-squares solution.
+def information(runs: Iterable[RunResiduals]) -> Information:
+    """What some runs say that were fitted together, from their residuals."""
+    runs = list(runs)
+    n = runs[0].jacobian.shape[2]
+    root = triangle(np.concatenate([run.jacobian.reshape(-1, n) for run in runs]))
+    bread = _bread(root)[0]
+    widths = [bandwidth(run.residuals, run.step) for run in runs]
+    scatters = [_scatter(run, width, bread) for run, width in zip(runs, widths, strict=True)]
+    return Information(
+        root,
+        np.sum(scatters, axis=0),
+        sum(
+            effective_samples(channel, width)
+            for run, width in zip(runs, widths, strict=True)
+            for channel in run.residuals
+        ),
+        sum(3.0 * run.residuals.shape[1] / width for run, width in zip(runs, widths, strict=True)),
+    )
 
-    blocks : per run and channel the residuals (samples,) and their Jacobian (samples, n)
-    scale : (n,) typical size of each parameter
-    """
-    n = len(scale)
-    jacobian = np.concatenate([block_jacobian for _, block_jacobian in blocks]) * scale
-    _, singular, directions = np.linalg.svd(triangle(jacobian))
-    least = max(DIRECTION_TOLERANCE * singular[0], LEAST_EFFECT)
-    known = singular > least
-    undetermined = np.any(np.abs(directions[~known]) > PART_OF_DIRECTION, axis=0)
-    inverse_root = directions[known].T / singular[known]
-    bread = inverse_root @ inverse_root.T
 
-    meat = np.zeros((n, n))
-    effective_samples = 0.0
-    for residuals, block_jacobian in blocks:
-        autocovariance = smoothed_autocovariance(residuals)
-        meat += _toeplitz_product(block_jacobian * scale, autocovariance)
-        effective_samples += _effective_samples(autocovariance, len(residuals))
-    freedom = max(effective_samples - n, 1.0)
-    covariance = bread @ meat @ bread * (effective_samples / freedom)
-
-    std_error = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        correlation = covariance / np.outer(std_error, std_error)
-    correlation[undetermined, :] = correlation[:, undetermined] = np.nan
-    np.fill_diagonal(correlation, 1.0)
-    std_error = np.where(undetermined, np.inf, std_error * scale)
-    quantile = float(student_t.ppf(0.5 + CONFIDENCE / 2.0, freedom))
-    effect = np.linalg.norm(jacobian, axis=0)
+def uncertainty(known: Information) -> Uncertainty:
+    """Errors at a least-squares solution."""
+    bread, unknown, least = _bread(known.root)
+    covariance = bread @ known.scatter @ bread
+    effect = np.linalg.norm(known.root, axis=0)
+    scattered = np.sqrt(np.maximum(np.diag(known.scatter), 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):
-        alone = np.where(effect > least, scale * np.sqrt(np.diag(meat)) / effect**2, np.inf)
-    return Uncertainty(std_error, quantile * std_error, quantile * alone, correlation)
+        alone = np.where(effect > least, scattered / effect**2, np.inf)
+    freedom = max(min(known.samples - len(bread), known.freedom), 1.0)
+    quantile = float(student_t.ppf(0.5 + CONFIDENCE / 2.0, freedom))
+    return Uncertainty(covariance, unknown, quantile, alone)
 
 
-def smoothed_autocovariance(residuals: Array) -> Array:
-    """w_k g_k for lags k = 0, 1, ... as long as the Bartlett weight w_k is positive.
+def _bread(root: Array) -> tuple[Array, Array, float]:
+    """B over the directions which the runs move, the others (k, n), and their largest effect."""
+    _, singular, directions = np.linalg.svd(root)
+    least = max(DIRECTION_TOLERANCE * singular[0], LEAST_EFFECT)
+    held = singular > least
+    inverse_root = directions[held].T / singular[held]
+    return inverse_root @ inverse_root.T, directions[~held], least
+
+
+def smoothed_covariance(one: Array, other: Array, bandwidth: float) -> Array:
+    """w_k g(k) at lags k = 0, 1, ... with g(k) = sum of one_(t+k) other_t / N.
 
     The mean is not removed: a constant misfit is an error like any other.
     """
-    count = len(residuals)
+    count = len(one)
     length = _fast_length(2 * count)
-    power = np.abs(np.fft.rfft(residuals, length)) ** 2
-    autocovariance = np.fft.irfft(power, length)[:count] / count
-    if autocovariance[0] == 0.0:
-        return autocovariance[:1]
-    p = float(np.clip(autocovariance[1] / autocovariance[0], -0.9999, 0.9999))
-    a = 4.0 * p**2 / ((1.0 - p) ** 2 * (1.0 + p) ** 2)
-    bandwidth = float(np.clip(1.1447 * (a * count) ** (1.0 / 3.0), 1.0, count / 4.0))
-    lags = np.arange(int(np.ceil(bandwidth)))
-    return (1.0 - lags / bandwidth) * autocovariance[lags]
+    cross = np.fft.rfft(one, length) * np.fft.rfft(other, length).conj()
+    lags = np.arange(min(int(np.ceil(bandwidth)), count))
+    return (1.0 - lags / bandwidth) * np.fft.irfft(cross, length)[lags] / count
 
 
-def _toeplitz_product(jacobian: Array, autocovariance: Array) -> Array:
-    """J^T G J for the Toeplitz matrix G of the autocovariances, through the Fourier transform."""
-    length = _fast_length(len(jacobian) + len(autocovariance))
-    spectrum = 2.0 * np.fft.rfft(autocovariance, length).real - autocovariance[0]
-    transformed = np.fft.rfft(jacobian, length, axis=0)
-    weights = np.full(len(spectrum), 2.0)
+def bandwidth(residuals: Array, step: float) -> float:
+    """Lags, in samples, over which residuals (channels, samples) are taken to be correlated."""
+    count = residuals.shape[1]
+    longest = max(BODY_MEMORY / step, *(_andrews(channel) for channel in residuals))
+    return float(np.clip(longest, 1.0, max(count / 4.0, 1.0)))
+
+
+def effective_samples(residuals: Array, width: float) -> float:
+    """How many independent samples residuals (samples,) are worth, correlated over `width` lags."""
+    smoothed = smoothed_covariance(residuals, residuals, width)
+    if smoothed[0] == 0.0:
+        return float(len(residuals))
+    return len(residuals) / (2.0 * float(np.sum((smoothed / smoothed[0]) ** 2)) - 1.0)
+
+
+def _scatter(run: RunResiduals, width: float, bread: Array) -> Array:
+    """A run's part of M, of all its pairs of channels."""
+    channels, count, n = run.jacobian.shape
+    length = _fast_length(count + int(np.ceil(width)))
+    jacobian = np.fft.rfft(run.jacobian, length, axis=1)
+    left = np.sqrt([_left(of_channel, bread, count, width, length) for of_channel in jacobian])
+    weights = np.full(jacobian.shape[1], 2.0)
     weights[0] = 1.0
     if length % 2 == 0:
         weights[-1] = 1.0
-    weighted = (weights * spectrum)[:, np.newaxis] * transformed
-    return (transformed.conj().T @ weighted).real / length
+    scatter = np.zeros((n, n))
+    for a in range(channels):
+        for b in range(channels):
+            spectrum = _spectrum(run.residuals[a], run.residuals[b], width, length)
+            weighted = weights * spectrum / (left[a] * left[b])
+            scatter += (jacobian[a].conj().T @ (weighted[:, np.newaxis] * jacobian[b])).real
+    return scatter / length
+
+
+def _left(jacobian: Array, bread: Array, count: int, width: float, length: int) -> Array:
+    """Share of white noise's spectrum that the fit leaves in a channel.
+
+    jacobian : (frequencies, n) transform of the channel's
+    """
+    taken = np.sum((jacobian @ bread) * jacobian.conj(), axis=1).real
+    lags = np.arange(int(np.ceil(width)))
+    diagonals = (1.0 - lags / width) * np.fft.irfft(taken, length)[lags] / count
+    share = 2.0 * np.fft.rfft(diagonals, length).real - diagonals[0]
+    return np.maximum(1.0 - share, LEAST_LEFT)
+
+
+def _spectrum(one: Array, other: Array, width: float, length: int) -> NDArray[np.complex128]:
+    """Fourier transform of two channels' smoothed covariance over lags of both signs."""
+    ahead = np.fft.rfft(smoothed_covariance(one, other, width), length)
+    behind = smoothed_covariance(other, one, width)
+    behind[0] = 0.0
+    return ahead + np.fft.rfft(behind, length).conj()
+
+
+def _andrews(residuals: Array) -> float:
+    """Bandwidth in samples by the lag-one correlation; 0 where nothing is left."""
+    variance = float(residuals @ residuals)
+    if variance == 0.0:
+        return 0.0
+    p = float(np.clip(residuals[1:] @ residuals[:-1] / variance, -0.9999, 0.9999))
+    a = 4.0 * p**2 / ((1.0 - p) ** 2 * (1.0 + p) ** 2)
+    return 1.1447 * (a * len(residuals)) ** (1.0 / 3.0)
 
 
 def _fast_length(least: int) -> int:
     """A length of at least so much whose Fourier transform is quick."""
     return int(next_fast_len(least, real=True) or 0)
-
-
-def _effective_samples(autocovariance: Array, count: int) -> float:
-    if autocovariance[0] == 0.0:
-        return float(count)
-    ratio = autocovariance / autocovariance[0]
-    return count / (2.0 * float(np.sum(ratio**2)) - 1.0)

@@ -17,7 +17,7 @@ from ridetune.engine.problem import DEFAULT_NOISE
 from ridetune.engine.residuals import Residuals
 from ridetune.engine.rims_settings import RimsSettings
 from ridetune.engine.simulation import rims_batch, simulate_rims
-from ridetune.engine.uncertainty import uncertainty
+from ridetune.engine.uncertainty import information, uncertainty
 from ridetune.engine.validation import Case, validate
 from ridetune.engine.vehicle_file import read_vehicle
 from scipy.stats import chi2
@@ -165,7 +165,6 @@ def test_errors_of_the_linearised_fit_follow_the_stated_covariance(campaign):
     residuals = Residuals(problem, rims_batch)
     x = np.array([one.variable(one.start) for one in problem.free])
     jacobian = residuals.jacobian(x)
-    places = [block.place for block in residuals.blocks()]
     bread = np.linalg.inv(jacobian.T @ jacobian)
     rng = np.random.default_rng(11)
     distances = []
@@ -173,9 +172,8 @@ def test_errors_of_the_linearised_fit_follow_the_stated_covariance(campaign):
         noise = rng.normal(size=len(jacobian))
         error = bread @ jacobian.T @ noise
         left = noise - jacobian @ error
-        found = uncertainty([(left[place], jacobian[place]) for place in places], np.ones(12))
-        covariance = found.correlation * np.outer(found.std_error, found.std_error)
-        distances.append(error @ np.linalg.solve(covariance, error))
+        found = uncertainty(information(residuals.of_runs(left, jacobian)))
+        distances.append(error @ np.linalg.solve(found.covariance, error))
     assert np.mean(distances) == pytest.approx(12.0, abs=4 * np.sqrt(24 / 60) + 1.2)
 
 
@@ -186,7 +184,7 @@ def test_noisy_outputs_leave_springs_and_dampers_determined():
     fit = identify(Problem.build(CAR, runs, start=ELSEWHERE))
     errors = np.array([one.value - CAR.value(one.name) for one in fit.parameters])
     deviations = np.array([one.std_error for one in fit.parameters])
-    covariance = fit.correlation * np.outer(deviations, deviations)
+    covariance = fit.errors.correlation * np.outer(deviations, deviations)
     assert errors @ np.linalg.solve(covariance, errors) < chi2.ppf(0.999, 12)
     for one in fit.parameters:
         if one.name in SPRINGS_AND_DAMPERS:
@@ -195,7 +193,7 @@ def test_noisy_outputs_leave_springs_and_dampers_determined():
     assert fit.outcome in (Outcome.WEAKLY, Outcome.UNDETERMINED)
     bars = [one.name for one in fit.parameters].index("front.stabilizer_bar.stiffness")
     pivot = [one.name for one in fit.parameters].index("front.pivot.distance")
-    assert fit.correlation[bars, pivot] > 0.99
+    assert fit.errors.correlation[bars, pivot] > 0.99
 
 
 def test_a_standing_car_determines_nothing():
