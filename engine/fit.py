@@ -84,6 +84,52 @@ class ParameterEstimate:
 
 
 @dataclass(frozen=True, slots=True)
+class CombinationEstimate:
+    """A quantity that several parameters make together, SI; fields as of `ParameterEstimate`."""
+
+    name: str
+    symbol: str
+    label: str
+    unit: str
+    of: tuple[str, ...]
+    value: float
+    std_error: float
+    confidence_interval: tuple[float, float]
+    determined: str
+
+
+@dataclass(frozen=True, slots=True)
+class Direction:
+    """A way for the parameters to move together, an axis of their joint 95 % region.
+
+    half_width : how far they may go, in the search's variables, where 1 is about 100 %; infinite
+        where the runs do not determine it
+    parts : by parameter, the larger components of the unit direction, the largest first
+    combination : name of the one that moves along it and hardly otherwise, if there is one
+    """
+
+    half_width: float
+    parts: Mapping[str, float]
+    combination: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What the runs determine.
+
+    parameters : by "yes", "weakly" and "no", their names
+    combinations : that the runs determine better than their parameters
+    directions : axes of the joint region, the least determined first
+    sentences : the same for a person
+    """
+
+    parameters: Mapping[str, tuple[str, ...]]
+    combinations: tuple[CombinationEstimate, ...]
+    directions: tuple[Direction, ...]
+    sentences: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class FittedRun:
     """What was compared in one run, SI.
 
@@ -139,6 +185,7 @@ class Fit:
     traction: str
     settings: RimsSettings
     runs: tuple[FittedRun, ...]
+    verdict: Verdict
 
 
 def determined(value: float, half_width: float, at_bound: bool = False) -> str:

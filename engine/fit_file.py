@@ -20,6 +20,7 @@ def fit_to_json(fit: Fit) -> dict[str, Any]:
         {
             "vehicle": vehicle_to_json(fit.vehicle),
             "parameters": [_parameter(one) for one in fit.parameters],
+            "verdict": asdict(fit.verdict),
             "correlation": fit.errors.correlation.tolist(),
             "covariance": fit.errors.covariance.tolist(),
             "unknown": fit.errors.unknown.tolist(),

@@ -35,6 +35,7 @@ from .problem import ComparedRun, FreeParameter, Problem
 from .residuals import FAILED_TRIAL, Residuals, Simulate
 from .simulation import fit_percent, rims_batch
 from .uncertainty import DIRECTION_TOLERANCE, Uncertainty, information, uncertainty
+from .verdict import verdict, without_verdict
 
 __all__ = ["Fit", "FreeParameter", "Outcome", "Problem", "Progress", "identify"]
 
@@ -186,6 +187,9 @@ def identify(
     if converged:
         warnings += undetermined_findings(estimates, errors)
     return Fit(
+        verdict=verdict(estimates, errors, solution.x, problem.vehicle_at)
+        if converged
+        else without_verdict(estimates),
         vehicle=problem.vehicle_at(solution.x),
         parameters=estimates,
         cost=float(solution.cost),

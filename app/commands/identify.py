@@ -92,4 +92,6 @@ def print_fit(fit: Fit) -> None:
     print_fit_percent(fit.fit_percent)
     print()
     print(f"{fit.outcome} {fit.simulations} simulations in {fit.seconds:.1f} s.")
+    for sentence in fit.verdict.sentences:
+        print(sentence)
     print_warnings(fit.warnings)

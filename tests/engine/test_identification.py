@@ -165,6 +165,38 @@ def test_a_parameter_at_its_bound_is_reported():
     assert f"{name} is at its upper bound, 2.5e+04 N/m" in " ".join(found.warnings)
 
 
+@pytest.mark.parametrize(("bounds", "start"), [((1e4, 2.5e4), 2e4), ((2.9e4, 9e4), 3e4)])
+def test_the_interval_of_a_parameter_at_its_bound_is_open_beyond_it(bounds, start):
+    """Oracle: the interval of the fit without the bound. The truth, 27000, lies beyond it, by more
+    than an error; so the interval is all that lies beyond the bound. The stand-in is linear in the
+    logarithm, in which the point beyond the bound is found at once."""
+    name = PARAMETER_NAMES[2]
+    run = stand_in.recording(CAR)
+    free = fit([run]).parameters[2].confidence_interval
+    held = fit([run], start={**ELSEWHERE, name: start}, bounds={name: bounds}).parameters[2]
+    above = held.value < 27000.0
+    inner, outer = held.confidence_interval if above else held.confidence_interval[::-1]
+    assert outer == (np.inf if above else -np.inf)
+    assert inner == pytest.approx(held.value)
+    assert not free[0] < held.value < free[1]
+
+
+def test_the_interval_of_a_parameter_near_its_bound_reaches_back_as_without_it():
+    """Oracle: the fit without the bound, whose interval holds the bound, at half an error from the
+    estimate. The other parameters answer to the bound; the errors' own scatter is 10 %."""
+    name = PARAMETER_NAMES[2]
+    run = stand_in.recording(CAR)
+    free = fit([run]).parameters[2]
+    bound = free.value - 0.5 * free.std_error
+    held = fit([run], bounds={name: (1e4, bound)}, start={**ELSEWHERE, name: 2e4}).parameters[2]
+    assert held.at_bound
+    width = free.value - free.confidence_interval[0]
+    assert held.confidence_interval[0] == pytest.approx(
+        free.confidence_interval[0], abs=0.1 * width
+    )
+    assert held.confidence_interval[1] == np.inf
+
+
 def test_trials_that_fail_are_stepped_around():
     """Oracle: the truth, on the edge of a region of cars that fail."""
     name = PARAMETER_NAMES[0]

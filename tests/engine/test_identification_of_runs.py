@@ -196,6 +196,21 @@ def test_noisy_outputs_leave_springs_and_dampers_determined():
     assert fit.errors.correlation[bars, pivot] > 0.99
 
 
+def test_noise_of_the_inputs_too_leaves_the_front_bar_known_by_its_rate_at_the_wheels():
+    """Oracle: the truth, and Cramer-Rao: K_tor and d of the front axle have a correlation of 0.999,
+    so that the two accelerations of Table 2 determine K_tor/d^2 and neither of the two."""
+    noise = {**DEFAULT_NOISE, **dict.fromkeys(WHEEL_CHANNELS, 2e-4), "chassis.a_x": 0.05}
+    fit = identify(Problem.build(CAR, drive_table_2(CAR, noise=noise, seed=1)))
+    assert set(fit.verdict.parameters["yes"]) >= SPRINGS_AND_DAMPERS
+    bar, pivot = "front.stabilizer_bar.stiffness", "front.pivot.distance"
+    assert not {bar, pivot} & set(fit.verdict.parameters["yes"])
+    [rate] = [one for one in fit.verdict.combinations if one.name == "front.bar_rate"]
+    assert rate.of == (bar, pivot)
+    assert rate.determined == "yes"
+    true = CAR.value(bar) / CAR.value(pivot) ** 2
+    assert abs(rate.value - true) < 3 * rate.std_error
+
+
 def test_a_standing_car_determines_nothing():
     """Sensor noise alone, stated too small: the fit finds what follows it least badly."""
     rng = np.random.default_rng(5)

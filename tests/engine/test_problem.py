@@ -24,6 +24,27 @@ def recording(name="lap", outputs=OUTPUT_CHANNELS, seed=0, **others):
     return Run(name, time, channels, **others)
 
 
+def test_an_interval_is_symmetric_in_the_search_s_variable():
+    """Oracle: a factor either way for a logarithm, scale times the change for an angle."""
+    spring = FreeParameter(SPRING, 2e4, 1e3, 1.6e5)
+    x = spring.variable(24000.0)
+    assert spring.interval(x, math.log(2.0), math.log(2.0)) == pytest.approx((12000.0, 48000.0))
+    outside = FreeParameter(PIVOT, -1.0, -10.0, -0.1)
+    x = outside.variable(-1.5)
+    assert outside.interval(x, math.log(2.0), math.log(3.0)) == pytest.approx((-4.5, -0.75))
+    assert outside.interval(x, math.inf, math.log(3.0)) == (pytest.approx(-4.5), math.inf)
+    angle = FreeParameter("front.pivot.angle", 0.1, -0.3, 1.3)
+    x = angle.variable(0.2)
+    assert angle.interval(x, 1.0, 2.0) == pytest.approx((0.1, 0.4))
+    assert angle.interval(x, math.inf, math.inf) == (-math.inf, math.inf)
+
+
+def test_an_end_a_thousand_times_away_is_infinite():
+    spring = FreeParameter(SPRING, 2e4, 1e3, 1.6e5)
+    assert spring.interval(0.0, 7.0, 7.0) == (-math.inf, math.inf)
+    assert spring.interval(0.0, 6.0, 6.0) == pytest.approx((2e4 * np.exp(-6), 2e4 * np.exp(6)))
+
+
 def refused(*arguments, **named):
     with pytest.raises((ProblemError, ParameterError, MeasurementError)) as raised:
         Problem.build(*arguments, **named)

@@ -1,0 +1,138 @@
+"""Quantities of a car that its parameters make together, in the field's words.
+
+Runs may determine them where they leave the parameters apart: a bar acts on the wheels only as
+K_tor/d^2, and the traction of a wheel whose torque comes from the chassis lifts the car only as
+tan(phi) - r/d (docs/model.md).
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from .frames import AXLES, AxleName
+from .vehicle import Vehicle
+
+
+@dataclass(frozen=True, slots=True)
+class Combination:
+    """One quantity; `value` is SI.
+
+    of : names of the parameters that it is made of
+    signed : whether it may be negative or zero
+    """
+
+    name: str
+    symbol: str
+    label: str
+    unit: str
+    of: tuple[str, ...]
+    value: Callable[[Vehicle], float]
+    signed: bool = False
+
+
+def _bar_rate(axle: AxleName) -> Combination:
+    def value(car: Vehicle) -> float:
+        one = car.axle(axle)
+        return one.stabilizer_bar.stiffness / one.pivot.distance**2
+
+    return Combination(
+        name=f"{axle}.bar_rate",
+        symbol=f"Ktor_{axle[0].upper()}/d_{axle[0].upper()}^2",
+        label=f"{axle.capitalize()} stabilizer bar's rate at the wheels",
+        unit="N/m",
+        of=(f"{axle}.stabilizer_bar.stiffness", f"{axle}.pivot.distance"),
+        value=value,
+    )
+
+
+def _bar_damping(axle: AxleName) -> Combination:
+    def value(car: Vehicle) -> float:
+        one = car.axle(axle)
+        return one.stabilizer_bar.damping / one.pivot.distance**2
+
+    return Combination(
+        name=f"{axle}.bar_damping",
+        symbol=f"Ctor_{axle[0].upper()}/d_{axle[0].upper()}^2",
+        label=f"{axle.capitalize()} stabilizer bar's damping at the wheels",
+        unit="N s/m",
+        of=(f"{axle}.stabilizer_bar.damping", f"{axle}.pivot.distance"),
+        value=value,
+    )
+
+
+def _roll_rate(axle: AxleName) -> Combination:
+    def value(car: Vehicle) -> float:
+        one = car.axle(axle)
+        bar = 2.0 * one.stabilizer_bar.stiffness / one.pivot.distance**2
+        return one.suspension.stiffness + bar
+
+    letter = axle[0].upper()
+    return Combination(
+        name=f"{axle}.wheel_rate_in_roll",
+        symbol=f"K_{letter} + 2 Ktor_{letter}/d_{letter}^2",
+        label=f"{axle.capitalize()} wheel rate in roll",
+        unit="N/m",
+        of=(
+            f"{axle}.suspension.stiffness",
+            f"{axle}.stabilizer_bar.stiffness",
+            f"{axle}.pivot.distance",
+        ),
+        value=value,
+    )
+
+
+def _traction_slope(axle: AxleName) -> Combination:
+    def value(car: Vehicle) -> float:
+        one = car.axle(axle)
+        return math.tan(one.pivot.angle) - one.wheel.radius / one.pivot.distance
+
+    letter = axle[0].upper()
+    return Combination(
+        name=f"{axle}.traction_slope",
+        symbol=f"tan phi_{letter} - r/d_{letter}",
+        label=f"{axle.capitalize()} slope of the traction's line of action",
+        unit="1",
+        of=(f"{axle}.pivot.angle", f"{axle}.pivot.distance"),
+        value=value,
+        signed=True,
+    )
+
+
+def _pivot_height(axle: AxleName) -> Combination:
+    def value(car: Vehicle) -> float:
+        pivot = car.axle(axle).pivot
+        return pivot.distance * math.tan(pivot.angle)
+
+    letter = axle[0].upper()
+    return Combination(
+        name=f"{axle}.pivot_height",
+        symbol=f"d_{letter} tan phi_{letter}",
+        label=f"{axle.capitalize()} pivot's height above the ground",
+        unit="m",
+        of=(f"{axle}.pivot.distance", f"{axle}.pivot.angle"),
+        value=value,
+        signed=True,
+    )
+
+
+def _both_axles(number: str, letter: str, label: str, unit: str) -> Combination:
+    of = tuple(f"{axle}.suspension.{number}" for axle in AXLES)
+    return Combination(
+        name=f"suspension.{number}",
+        symbol=f"{letter}_F + {letter}_R",
+        label=label,
+        unit=unit,
+        of=of,
+        value=lambda car: sum(car.value(name) for name in of),
+    )
+
+
+COMBINATIONS: tuple[Combination, ...] = (
+    _both_axles("stiffness", "K", "Spring stiffness of both axles", "N/m"),
+    _both_axles("damping", "C", "Damping of both axles", "N s/m"),
+    *(
+        make(axle)
+        for make in (_bar_rate, _bar_damping, _roll_rate, _traction_slope, _pivot_height)
+        for axle in AXLES
+    ),
+)

@@ -1,0 +1,110 @@
+import math
+
+import numpy as np
+import pytest
+from ridetune.engine.combinations import COMBINATIONS
+from ridetune.engine.fit import ParameterEstimate
+from ridetune.engine.uncertainty import Uncertainty
+from ridetune.engine.verdict import by_class, verdict, without_verdict
+
+from ..factories import paper_vehicle
+
+CAR = paper_vehicle()
+BAR, DISTANCE, ANGLE = "front.stabilizer_bar.stiffness", "front.pivot.distance", "front.pivot.angle"
+NAMES = (BAR, DISTANCE)
+NAMED = {one.name: one for one in COMBINATIONS}
+
+
+def judged(covariance, unknown=(), words=("weakly", "weakly"), names=NAMES):
+    """The verdict on parameters with some covariance of their logarithms."""
+    n = len(names)
+    errors = Uncertainty(
+        np.array(covariance), np.array(unknown).reshape(-1, n), quantile=2.0, alone=np.zeros(n)
+    )
+    estimates = [
+        ParameterEstimate(name, CAR.value(name), "", 0.0, (0, 0), 1.0, 1e-9, 1e9, False, word)
+        for name, word in zip(names, words, strict=True)
+    ]
+
+    def vehicle_at(x):
+        return CAR.with_values(
+            {name: CAR.value(name) * math.exp(v) for name, v in zip(names, x, strict=True)}
+        )
+
+    return verdict(estimates, errors, np.zeros(n), vehicle_at)
+
+
+def along(*directions):
+    """Covariance with variances along directions that are at right angles: pairs of both."""
+    units = [(variance, np.array(axis) / np.linalg.norm(axis)) for variance, axis in directions]
+    return sum(variance * np.outer(axis, axis) for variance, axis in units)
+
+
+def test_a_bar_is_known_by_its_rate_at_the_wheels_where_its_stiffness_is_not():
+    """Oracle: Var ln(Ktor/d^2) = Var ln Ktor + 4 Var ln d - 4 Cov. K_tor and d move by 20 % and
+    10 % together, their rate by 1 %: along (1, -2)/sqrt(5) a variance of 1e-4 / 5."""
+    found = judged(along((0.05, (2, 1)), (1e-4 / 5, (1, -2))))
+    rate = next(one for one in found.combinations if one.name == "front.bar_rate")
+    assert rate.value == pytest.approx(CAR.value(BAR) / CAR.value(DISTANCE) ** 2)
+    assert rate.std_error == pytest.approx(0.01 * rate.value, rel=1e-6)
+    low, high = rate.confidence_interval
+    assert (low, high) == pytest.approx((rate.value * np.exp(-0.02), rate.value * np.exp(0.02)))
+    assert rate.determined == "yes"
+    [sentence] = [one for one in found.sentences if "bar's rate" in one]
+    assert sentence.startswith("Ktor_F and d_F are determined only together, as Ktor_F/d_F^2")
+
+
+def test_a_direction_that_no_run_moves_leaves_the_rate_known():
+    """Oracle: (2, 1) in (ln Ktor, ln d) leaves Ktor/d^2 as it is, so its error stays finite."""
+    found = judged(
+        along((1e-4 / 5, (1, -2))), unknown=[np.array([2, 1]) / math.sqrt(5)], words=("no", "no")
+    )
+    rate = next(one for one in found.combinations if one.name == "front.bar_rate")
+    assert rate.std_error == pytest.approx(0.01 * rate.value, rel=1e-6)
+    first, second = found.directions
+    assert first.half_width == math.inf
+    assert dict(first.parts) == pytest.approx({BAR: 2 / math.sqrt(5), DISTANCE: 1 / math.sqrt(5)})
+    assert second.half_width == pytest.approx(2.0 * math.sqrt(1e-4 / 5))
+    assert second.combination == "front.bar_rate"
+
+
+def test_independent_parameters_are_not_told_together():
+    """Oracle: uncorrelated, the rate is as uncertain as its parts make it."""
+    assert not judged(np.diag([0.02, 0.02])).combinations
+
+
+def test_well_known_parameters_need_no_combination():
+    covariance = along((0.05, (2, 1)), (1e-4 / 5, (1, -2)))
+    assert not judged(covariance, words=("yes", "yes")).combinations
+
+
+def test_the_traction_slope_s_error_is_absolute():
+    """Oracle: d(tan phi - r/d) = phi / cos^2 phi dln(phi) + r/d dln(d) for logarithms of both."""
+    pivot, radius = CAR.front.pivot, CAR.front.wheel.radius
+    gradient = np.array(
+        [radius / pivot.distance, pivot.angle / math.cos(pivot.angle) ** 2],
+    )
+    across = np.array([gradient[1], -gradient[0]])
+    covariance = along((0.05, across), (1e-6 / (gradient @ gradient), gradient))
+    found = judged(covariance, names=(DISTANCE, ANGLE))
+    slope = next(one for one in found.combinations if one.name == "front.traction_slope")
+    assert slope.std_error == pytest.approx(1e-3, rel=1e-6)
+    assert slope.value == pytest.approx(math.tan(pivot.angle) - radius / pivot.distance)
+    low, high = slope.confidence_interval
+    assert (low, high) == pytest.approx((slope.value - 2e-3, slope.value + 2e-3))
+
+
+def test_a_bar_that_is_turned_by_opposite_wheels_stiffens_each():
+    """Oracle: energy. Wheels at +z and -z turn the arms by z/d each way, so the bar holds
+    1/2 Ktor (2 z/d)^2 and the springs 2 x 1/2 K z^2: both wheels' 1/2 rate z^2."""
+    bar, distance, z = CAR.front.stabilizer_bar.stiffness, CAR.front.pivot.distance, 0.01
+    energy = 0.5 * bar * (2 * z / distance) ** 2 + CAR.front.suspension.stiffness * z**2
+    rate = NAMED["front.wheel_rate_in_roll"].value(CAR)
+    assert 2 * 0.5 * rate * z**2 == pytest.approx(energy)
+
+
+def test_a_fit_without_errors_has_classes_alone():
+    estimate = ParameterEstimate(BAR, 1.0, "", 0.0, (0, 0), 1.0, 0.1, 9.0, False, "no")
+    found = without_verdict([estimate])
+    assert found.parameters == by_class([estimate]) == {"yes": (), "weakly": (), "no": (BAR,)}
+    assert [found.combinations, found.directions, found.sentences] == [(), (), ()]
