@@ -55,6 +55,15 @@ class Outcome(StrEnum):
 CONVERGED = (Outcome.DETERMINED, Outcome.WEAKLY, Outcome.AT_BOUND, Outcome.UNDETERMINED)
 
 
+class Ending(StrEnum):
+    """How one search ended; the value is the sentence the engineer reads."""
+
+    CONVERGED = "The search converged."
+    SAME_BASIN = "The search was cut short in the basin of a minimum already found."
+    BUDGET_SPENT = "The search ran out of evaluations before it converged."
+    STUCK = "The search stopped because the model fails for most cars around it."
+
+
 @dataclass(frozen=True, slots=True)
 class ParameterEstimate:
     """One identified parameter, SI.
@@ -144,10 +153,32 @@ class FittedRun:
 
 
 @dataclass(frozen=True, slots=True)
+class Minimum:
+    """A minimum of the cost that searches ended in, SI.
+
+    starts : searches that ended here
+    cut_short : those of them that were not run to their end, being clearly in this basin
+    from_start : whether the search from the start values is among them
+    at_bound : names of the parameters at a bound
+    outcome : how the lowest of these searches ended
+    """
+
+    cost: float
+    parameters: Mapping[str, float]
+    fit_percent: Mapping[str, Mapping[str, float]]
+    starts: int
+    cut_short: int
+    from_start: bool
+    at_bound: tuple[str, ...]
+    outcome: Ending
+
+
+@dataclass(frozen=True, slots=True)
 class Progress:
     """Where a fit stands after an evaluation: the best found so far.
 
     cost : half the sum of squared residuals, in units of the noise
+    search, searches : which of how many searches is under way, from 1
     """
 
     evaluations: int
@@ -155,6 +186,8 @@ class Progress:
     cost: float
     parameters: Mapping[str, float]
     fit_percent: Mapping[str, Mapping[str, float]]
+    search: int = 1
+    searches: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,6 +200,8 @@ class Fit:
     fit_percent : by run and channel
     residuals : by run and channel, (samples,) model minus measured, SI
     cost_history : the best cost after each evaluation
+    starts : points that were tried as starts, the told one among them
+    minima : what the searches from the best of them ended in, the fit's own first
     """
 
     vehicle: Vehicle
@@ -185,6 +220,8 @@ class Fit:
     traction: str
     settings: RimsSettings
     runs: tuple[FittedRun, ...]
+    starts: int
+    minima: tuple[Minimum, ...]
     verdict: Verdict
 
 

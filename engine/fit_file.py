@@ -42,6 +42,8 @@ def fit_to_json(fit: Fit) -> dict[str, Any]:
             ],
             "traction": fit.traction,
             "settings": asdict(fit.settings),
+            "starts": fit.starts,
+            "minima": [asdict(one) for one in fit.minima],
             "seconds": fit.seconds,
             "simulations": fit.simulations,
             "evaluations": fit.evaluations,

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .fit import ParameterEstimate
+from .fit import Minimum, ParameterEstimate
 from .problem import ComparedRun
 from .simulation import fit_percent
 from .spikes import despiked
@@ -52,6 +52,10 @@ UNIT_RATIOS = {
 }
 """By channel: the ratio of measured to model amplitude that a mistaken unit makes, the factor
 around it that counts, the unit of the numbers and the unit the header claims."""
+
+AS_GOOD = 1.02
+"""Times the lowest cost up to which another minimum fits about as well: its residuals' rms is a
+hundredth larger."""
 
 UNEXCITED = 0.5
 """A parameter is unexcited when, even with all others known, its 95 % half-width would exceed
@@ -168,6 +172,33 @@ def hardly_moving(runs: Sequence[ComparedRun]) -> list[str]:
             for channel, values in seen.measured.items()
         )
     ]
+
+
+def minima_findings(minima: Sequence[Minimum]) -> list[str]:
+    """Where the start values alone would have led, and minima that fit as well as the best."""
+    best, *others = minima
+    found = []
+    led = next(one for one in minima if one.from_start)
+    if led is not best:
+        found.append(
+            f"From the start values alone the fit would have ended at a cost of {led.cost:.5g} in "
+            f"place of {best.cost:.5g}."
+        )
+    for other in others:
+        if other.cost < AS_GOOD * best.cost:
+            apart = max(best.parameters, key=lambda name: _ratio(best, other, name))
+            found.append(
+                f"Another minimum fits nearly as well (cost {other.cost:.5g} against "
+                f"{best.cost:.5g}): {apart} is {other.parameters[apart]:.4g} there in place of "
+                f"{best.parameters[apart]:.4g}; add a run that tells them apart."
+            )
+    return found
+
+
+def _ratio(one: Minimum, other: Minimum, name: str) -> float:
+    """How far two minima are apart in a parameter, relative."""
+    first, second = one.parameters[name], other.parameters[name]
+    return abs(first - second) / max(abs(first), abs(second), 1e-9)
 
 
 def bound_findings(estimates: Sequence[ParameterEstimate]) -> list[str]:

@@ -10,31 +10,41 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 from scipy.stats.qmc import Halton
 
 from .channels import WHEEL_CHANNELS
-from .condensed import condensed_jacobian, condensed_residuals
 from .errors import ProblemError
-from .fit import CONVERGED, Fit, FittedRun, Outcome, ParameterEstimate, Progress, determined
+from .fit import (
+    CONVERGED,
+    Ending,
+    Fit,
+    FittedRun,
+    Minimum,
+    Outcome,
+    ParameterEstimate,
+    Progress,
+    determined,
+)
 from .fit_findings import (
     Histories,
     bound_findings,
     channel_faults,
     hardly_moving,
+    minima_findings,
     poor_fits,
     undetermined_findings,
 )
 from .initial_state import swings_in
+from .multistart import MOST_STARTS, refined_starts, spread
 from .parameters import parameter
 from .problem import ComparedRun, FreeParameter, Problem
 from .residuals import FAILED_TRIAL, Residuals, Simulate
-from .simulation import fit_percent, rims_batch
-from .uncertainty import DIRECTION_TOLERANCE, Uncertainty, information, uncertainty
+from .search import Found, Search
+from .simulation import rims_batch
+from .uncertainty import Uncertainty, information, uncertainty
 from .verdict import verdict, without_verdict
 
 __all__ = ["Fit", "FreeParameter", "Outcome", "Problem", "Progress", "identify"]
@@ -49,10 +59,6 @@ EVALUATIONS_ON_A_FAULT = 40
 """Trial points spent when a channel probably has the wrong sign or unit: enough should it turn out
 to be right, no more because a fit to the wrong one means nothing."""
 
-COST_TOLERANCE = 1e-8
-STEP_TOLERANCE = 1e-8
-GRADIENT_TOLERANCE = 1e-8
-
 AT_BOUND = 1e-3
 """A value nearer to a bound than this share of the range between the bounds is at it."""
 
@@ -65,76 +71,29 @@ MUCH_BETTER = 0.5
 """Such a car is taken when its squared residuals are below this share of the start's."""
 
 
-class _Search:
-    """Residuals as the optimiser calls them, condensed, keeping the best point and telling of
-    progress.
-
-    slopes : (samples, parameters) the last Jacobian asked for, which is that at the solution
-    """
-
-    slopes: Array
-
-    def __init__(self, residuals: Residuals, progress: Callable[[Progress], None] | None):
-        self.residuals = residuals
-        self.evaluations = 0
-        self.failures = 0
-        self.cost_history: list[float] = []
-        self._progress = progress
-
-    def vector(self, x: Array) -> Array:
-        """r(x), condensed; one evaluation."""
-        r = self.residuals.vector(x)
-        cost = 0.5 * float(r @ r)
-        self.evaluations += 1
-        self.failures += bool(np.any(r == FAILED_TRIAL))
-        if not self.cost_history or cost < self.cost_history[-1]:
-            self._best = x.copy(), r
-        self.cost_history.append(min([cost, *self.cost_history[-1:]]))
-        if self._progress is not None:
-            self._progress(self._state())
-        return condensed_residuals(r, len(x))
-
-    def jacobian(self, x: Array) -> Array:
-        """dr/dx, condensed."""
-        self.slopes = self.residuals.jacobian(x)
-        return condensed_jacobian(self.residuals.vector(x), self.slopes)
-
-    def beyond(self, x: Array) -> Array:
-        """Where the search would go on to from its solution x were there no bounds."""
-        r = self.residuals.vector(x)
-        return x - np.linalg.lstsq(self.slopes, r, rcond=DIRECTION_TOLERANCE)[0]
-
-    def _state(self) -> Progress:
-        x, r = self._best
-        problem = self.residuals.problem
-        values = problem.values(x).tolist()
-        return Progress(
-            evaluations=self.evaluations,
-            simulations=self.residuals.simulations,
-            cost=self.cost_history[-1],
-            parameters={one.name: v for one, v in zip(problem.free, values, strict=True)},
-            fit_percent=_percents(self.residuals, r),
-        )
-
-
 def identify(
     problem: Problem,
     *,
     progress: Callable[[Progress], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
     most_evaluations: int = MOST_EVALUATIONS,
+    starts: int = 1,
+    seed: int = 0,
     simulate: Simulate = rims_batch,
 ) -> Fit:
     """Fit the problem's free parameters.
 
     progress : called after every evaluation
     cancelled : polled throughout; Cancelled is raised within a tenth of a second of its being true
-    most_evaluations : trial points before the fit gives up
+    most_evaluations : trial points before a search gives up
+    starts : points to try as starts, the told one and others spread over the bounds by `seed`
     simulate : the model, as a function of cars, inputs and traction
 
     A poor, undetermined or unfinished fit is a result and says so in its outcome and warnings.
     Raises ProblemError when the model cannot follow the runs from the start values, and Cancelled.
     """
+    if not 1 <= starts <= MOST_STARTS:
+        raise ProblemError(f"starts is {starts}; give a number from 1 to {MOST_STARTS}.")
     began = time.perf_counter()
     residuals = Residuals(problem, simulate, cancelled)
     # A start on a bound leaves the trust region no room and the search ends where it began.
@@ -147,29 +106,22 @@ def identify(
     x_start, moved = _usable_start(residuals, x_start)
     start = residuals.model(x_start)
 
-    search = _Search(residuals, progress)
-    solution = least_squares(
-        search.vector,
-        x_start,
-        cast(Any, search.jacobian),  # scipy's hints know no callable here
-        bounds=(residuals.lower, residuals.upper),
-        method="trf",
-        ftol=COST_TOLERANCE,
-        xtol=STEP_TOLERANCE,
-        gtol=GRADIENT_TOLERANCE,
-        max_nfev=min(most_evaluations, EVALUATIONS_ON_A_FAULT)
-        if _in_doubt(residuals, x_start)
-        else most_evaluations,
-    )
-    r = residuals.vector(solution.x)
-    errors = uncertainty(information(residuals.of_runs(r, search.slopes)))
-    estimates = _estimates(problem, solution.x, errors, beyond=search.beyond(solution.x))
+    search = Search(residuals, progress)
+    if _in_doubt(residuals, x_start):  # where other starts would mean nothing either
+        most_evaluations, starts = min(most_evaluations, EVALUATIONS_ON_A_FAULT), 1
+    others = spread(residuals.lower + room, residuals.upper - room, starts - 1, seed)
+    reached = refined_starts(search, x_start, others, most_evaluations)
+    solution = reached[0][0]
+    r = solution.residuals
+    errors = uncertainty(information(residuals.of_runs(r, solution.slopes)))
+    estimates = _estimates(problem, solution.x, errors, beyond=solution.beyond())
     fitted = residuals.model(solution.x)
     driven = _well_driven(problem)
     faults = channel_faults(driven, start, fitted)
     wrong = bool(faults) or len(driven) < len(problem.runs)
-    outcome = Outcome.DOUBTFUL if wrong else _outcome(solution.status, estimates, search)
+    outcome = Outcome.DOUBTFUL if wrong else _outcome(solution, estimates, residuals)
     converged = outcome in CONVERGED
+    minima = tuple(_minimum(ended, residuals) for ended in reached)
     if not converged:
         estimates = tuple(replace(one, determined="no") for one in estimates)
     warnings = [
@@ -182,6 +134,7 @@ def identify(
             *poor_fits(problem.runs, fitted),
             *_swings(problem, fitted),
             *hardly_moving(problem.runs),
+            *minima_findings(minima),
             *bound_findings(estimates),
         ]
     if converged:
@@ -194,7 +147,7 @@ def identify(
         parameters=estimates,
         cost=float(solution.cost),
         errors=errors,
-        fit_percent=_percents(residuals, r),
+        fit_percent=residuals.percents(r),
         residuals=_histories(residuals, r),
         outcome=outcome,
         converged=converged,
@@ -209,6 +162,8 @@ def identify(
             FittedRun(seen.name, len(seen.inputs.time), dict(seen.noise), seen.inputs.braking)
             for seen in problem.runs
         ),
+        starts=starts,
+        minima=minima,
     )
 
 
@@ -298,7 +253,7 @@ def _estimates(
         problem.free, x.tolist(), beyond.tolist(), errors.std_error.tolist(), strict=True
     ):
         value = one.value(variable)
-        at_bound = min(value - one.lower, one.upper - value) < AT_BOUND * (one.upper - one.lower)
+        at_bound = _at_bound(one, value)
         below = above = errors.quantile * deviation
         if at_bound and variable < 0.5 * sum(map(one.variable, (one.lower, one.upper))):
             below, above = math.inf, max(0.0, further - variable + above)
@@ -322,13 +277,39 @@ def _estimates(
     return tuple(found)
 
 
-def _outcome(status: int, estimates: tuple[ParameterEstimate, ...], search: _Search) -> Outcome:
-    """The sentence for how the search ended; status is that of least_squares."""
-    if status <= 0:
+def _minimum(ended: list[Found], residuals: Residuals) -> Minimum:
+    """A minimum as data, from the searches that ended in it, the lowest first."""
+    lowest, problem = ended[0], residuals.problem
+    values = problem.values(lowest.x).tolist()
+    return Minimum(
+        cost=lowest.cost,
+        parameters={one.name: value for one, value in zip(problem.free, values, strict=True)},
+        fit_percent=residuals.percents(lowest.residuals),
+        starts=len(ended),
+        cut_short=sum(one.ending == Ending.SAME_BASIN for one in ended),
+        from_start=any(one.told for one in ended),
+        at_bound=tuple(
+            one.name
+            for one, value in zip(problem.free, values, strict=True)
+            if _at_bound(one, value)
+        ),
+        outcome=lowest.ending,
+    )
+
+
+def _at_bound(one: FreeParameter, value: float) -> bool:
+    return min(value - one.lower, one.upper - value) < AT_BOUND * (one.upper - one.lower)
+
+
+def _outcome(
+    found: Found, estimates: tuple[ParameterEstimate, ...], residuals: Residuals
+) -> Outcome:
+    """The sentence for how the fit ended."""
+    if found.ending == Ending.BUDGET_SPENT:
         return Outcome.BUDGET_SPENT
-    if search.failures > 0.5 * search.evaluations:
+    if found.ending == Ending.STUCK:
         return Outcome.STUCK
-    if 2.0 * search.cost_history[-1] > search.residuals.scatter():
+    if 2.0 * found.cost > residuals.scatter():
         return Outcome.ASTRAY
     if any(one.at_bound for one in estimates):
         return Outcome.AT_BOUND
@@ -336,16 +317,6 @@ def _outcome(status: int, estimates: tuple[ParameterEstimate, ...], search: _Sea
     if "no" in verdicts:
         return Outcome.UNDETERMINED
     return Outcome.WEAKLY if "weakly" in verdicts else Outcome.DETERMINED
-
-
-def _percents(residuals: Residuals, r: Array) -> dict[str, dict[str, float]]:
-    """Fit percent by run and channel."""
-    percents: dict[str, dict[str, float]] = {}
-    for block in residuals.blocks():
-        error = block.noise * r[block.place]
-        percent = fit_percent(block.measured, block.measured + error)
-        percents.setdefault(block.run, {})[block.channel] = percent
-    return percents
 
 
 def _histories(residuals: Residuals, r: Array) -> dict[str, dict[str, Array]]:

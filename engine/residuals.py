@@ -33,7 +33,7 @@ from .filters import smoothed
 from .kernels.lanes import BATCH
 from .problem import Problem
 from .rims import RimsInputs
-from .simulation import Traction
+from .simulation import Traction, fit_percent
 from .stability import check_rims_step
 from .uncertainty import RunResiduals
 
@@ -43,6 +43,9 @@ Simulate = Callable[[Array, RimsInputs, Traction], Array]
 
 DIFFERENCE = 1e-4
 """Step h of the differences of x."""
+
+QUICK_DIFFERENCE = 1e-6
+"""Step of the differences of first order of x, whose error is of order h + 1e-13 / h."""
 
 FAILED_TRIAL = 1e8
 """Residual of a failed car, in units of the noise."""
@@ -102,6 +105,7 @@ class Residuals:
         self._simulate = simulate
         self._cancelled = cancelled
         self._last: tuple[Array, Array] | None = None
+        self._quick: tuple[Array, Array] | None = None
 
     def blocks(self) -> list[Block]:
         """The blocks of the residual vector, in order."""
@@ -147,10 +151,32 @@ class Residuals:
             self._last = (x.copy(), np.where(np.isfinite(rows[0]), rows[0], FAILED_TRIAL))
         return self._last[1]
 
+    def quick(self, x: Array) -> tuple[Array, Array]:
+        """r(x) and dr/dx with an error of 1e-6, from ONE batch of n + 1 cars: for the way to a
+        minimum, where both are asked for at nearly every point.
+        """
+        if self._quick is None or not np.array_equal(self._quick[0], x):
+            step = np.where(x + QUICK_DIFFERENCE <= self.upper, 1.0, -1.0) * QUICK_DIFFERENCE
+            rows = self._batch([x, *(x + np.diag(step))])
+            centre = np.where(np.isfinite(rows[0]), rows[0], FAILED_TRIAL)
+            columns = ((rows[1:] - centre) / step[:, np.newaxis]).T
+            self._last = x.copy(), centre
+            self._quick = x.copy(), np.nan_to_num(columns)
+        return self.vector(x), self._quick[1]
+
     def squares(self, trials: Sequence[Array]) -> Array:
         """Sum of squared residuals at each of many points, infinite where the car fails."""
         rows = self._batch(trials)
         return np.nan_to_num(np.einsum("ij,ij->i", rows, rows), nan=np.inf)
+
+    def percents(self, r: Array) -> dict[str, dict[str, float]]:
+        """Fit percent by run and channel, of residuals r."""
+        found: dict[str, dict[str, float]] = {}
+        for block in self.blocks():
+            error = block.noise * r[block.place]
+            percent = fit_percent(block.measured, block.measured + error)
+            found.setdefault(block.run, {})[block.channel] = percent
+        return found
 
     def scatter(self) -> float:
         """Sum of squared residuals of a model that stays at each channel's mean."""

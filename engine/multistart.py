@@ -1,0 +1,81 @@
+"""Many starts: which minima the cost has, and which of them is the lowest.
+
+Starts are a scrambled Sobol sequence (Owen 1998; scipy.stats.qmc) between the bounds, in the
+optimiser's variables: a stiffness is as likely between 0.1 and 0.2 of a bound's range in logarithm
+as between 0.8 and 0.9. All of them are simulated once, in one batch; the start that was told and
+the best of the others are refined. A refinement is cut short once the quadratic about a minimum
+already found promises its cost and its Newton step (`search.Found.holds`); it is counted there,
+and so told.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats.qmc import Sobol
+
+from .fit import Ending
+from .search import SAME_POINT, Found, Search
+
+Array = NDArray[np.float64]
+
+MOST_STARTS = 1024
+REFINED = 8
+"""Searches run to their end, that from the told start among them."""
+
+SAME_COST = 1e-4
+"""Relative difference of cost up to which two minima may be one (as may those whose costs differ
+by less than a move of SAME_POINT does at the stated noise), and ..."""
+
+SAME_VALUES = 1e-3
+"""... difference in every one of the optimiser's variables, where `search.SAME_POINT` does not say
+so already."""
+
+
+def spread(lower: Array, upper: Array, count: int, seed: int) -> list[Array]:
+    """`count` points between the bounds, of a Sobol sequence scrambled by `seed`."""
+    if count < 1:
+        return []
+    sequence = Sobol(len(lower), scramble=True, rng=seed)
+    # The balance of the sequence is that of a power of two; of one, its first points are taken.
+    shares = sequence.random_base2(int(np.ceil(np.log2(count))))[:count]
+    return [lower + (upper - lower) * share for share in shares]
+
+
+def refined_starts(
+    search: Search, start: Array, others: list[Array], most_evaluations: int
+) -> list[list[Found]]:
+    """Distinct minima, the lowest first, each with all refinements that ended there, its own first.
+
+    start : refined first and in any case;  others : points, of which the best are refined
+    """
+    costs = search.residuals.squares(others) if others else np.zeros(0)
+    best = [k for k in np.argsort(costs, kind="stable")[: REFINED - 1] if np.isfinite(costs[k])]
+    trials = [start, *(others[k] for k in best)]
+    minima: list[list[Found]] = []
+    for k, trial in enumerate(trials):
+        search.turn = (k + 1, len(trials))
+        known = [of[0] for of in minima if of[0].ending == Ending.CONVERGED]
+        found = (
+            search.explore(trial, most_evaluations, known)
+            if k
+            else search.refine(trial, most_evaluations)
+        )
+        place = next((of for of in minima if _ended_in(of, found)), None)
+        if place is None:
+            minima.append([found])
+        elif found.ending == Ending.CONVERGED and found.cost < place[0].cost:
+            place.insert(0, found)
+        else:
+            place.append(found)
+    return sorted(minima, key=lambda of: of[0].cost)
+
+
+def _ended_in(minimum: list[Found], found: Found) -> bool:
+    """Whether a refinement ended in a minimum, given as all that ended there before."""
+    if found.minimum is not None:
+        return any(one is found.minimum for one in minimum)
+    first = minimum[0]
+    apart = abs(first.cost - found.cost)
+    if apart > max(SAME_COST * min(first.cost, found.cost), 0.5 * SAME_POINT**2):
+        return False
+    near = float(np.max(np.abs(first.x - found.x))) <= SAME_VALUES
+    return near or max(first.distance(found.x), found.distance(first.x)) <= SAME_POINT

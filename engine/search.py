@@ -1,0 +1,191 @@
+"""The search for a minimum: scipy's trust-region reflective least squares between bounds.
+
+The optimiser is handed condensed residuals; what it asks for is kept with the result, so that
+nothing is simulated twice. One `Search` may refine several starts; a refinement that falls into a
+minimum already found is cut short, if the caller asks for that.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from .condensed import condensed_jacobian, condensed_residuals
+from .fit import Ending, Progress
+from .residuals import FAILED_TRIAL, Residuals
+from .uncertainty import DIRECTION_TOLERANCE
+
+Array = NDArray[np.float64]
+
+COST_TOLERANCE = 1e-8
+STEP_TOLERANCE = 1e-8
+GRADIENT_TOLERANCE = 1e-8
+
+QUADRATIC = 0.3
+"""Share by which cost and Newton step at a point may miss what the quadratic about a minimum
+promises there, for the point to lie in the basin of that minimum."""
+
+SAME_POINT = 0.1
+"""Standard errors within which two points are the same minimum."""
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """Where one refinement ended.
+
+    cost : half the sum of squared residuals, in units of the noise
+    residuals, slopes : (samples,) r and (samples, n) dr/dx there
+    curvature : (n, n) J^T J, the cost's second derivative as Gauss and Newton have it
+    told : whether it began from the problem's start values
+    minimum : in whose basin it was cut short
+    """
+
+    x: Array
+    cost: float
+    residuals: Array
+    slopes: Array
+    curvature: Array
+    ending: Ending
+    told: bool
+    minimum: "Found | None" = None
+
+    def variance(self) -> float:
+        """Mean square of the residuals over their degrees of freedom."""
+        samples, n = self.slopes.shape
+        return 2.0 * self.cost / max(samples - n, 1)
+
+    def distance(self, x: Array) -> float:
+        """How far x is from here, in standard errors: |J (x - x_0)| over the residuals' rms."""
+        away = x - self.x
+        rise = float(away @ self.curvature @ away)
+        return float(np.sqrt(max(rise, 0.0) / max(self.variance(), np.finfo(float).tiny)))
+
+    def beyond(self) -> Array:
+        """Where the search would go on to were there no bounds."""
+        return self.x - np.linalg.lstsq(self.slopes, self.residuals, rcond=DIRECTION_TOLERANCE)[0]
+
+    def holds(self, x: Array, cost: float, gradient: Array) -> bool:
+        """Whether x lies where the quadratic about this minimum is the cost: its basin.
+
+        The cost must rise from here to x as promised, and the Newton step from x, by the curvature
+        here, lead back here; both within QUADRATIC, or a tenth of a standard error.
+        """
+        away = x - self.x
+        rise = 0.5 * float(away @ self.curvature @ away)
+        some = SAME_POINT**2 * max(self.variance(), np.finfo(float).tiny)
+        if abs(cost - self.cost - rise) > max(QUADRATIC * rise, some):
+            return False
+        missed = away - np.linalg.pinv(self.curvature, hermitian=True) @ gradient
+        return float(missed @ self.curvature @ missed) <= max(2.0 * QUADRATIC**2 * rise, some)
+
+
+class _SameBasin(Exception):
+    """Ends a refinement; carries the minimum in whose basin it is."""
+
+    def __init__(self, minimum: Found):
+        self.minimum = minimum
+
+
+class Search:
+    """Refinements of one problem, keeping the best point of all and telling of progress."""
+
+    def __init__(self, residuals: Residuals, progress: Callable[[Progress], None] | None = None):
+        self.residuals = residuals
+        self.evaluations = 0
+        self.cost_history: list[float] = []
+        self.turn: tuple[int, int] = (1, 1)
+        self._progress = progress
+        self._quick = False
+        self._minima: Sequence[Found] = ()
+
+    def explore(self, x: Array, most_evaluations: int, minima: Sequence[Found]) -> Found:
+        """Search from x with quick derivatives; cut short in the basin of one of `minima`, else
+        refined.
+        """
+        self._quick, self._minima = True, minima
+        try:
+            found = self._run(x, most_evaluations)
+        finally:
+            self._quick, self._minima = False, ()
+        return self.refine(found.x, most_evaluations) if found.minimum is None else found
+
+    def refine(self, x: Array, most_evaluations: int) -> Found:
+        """Search from x."""
+        return self._run(x, most_evaluations)
+
+    def _run(self, x: Array, most_evaluations: int) -> Found:
+        self._began, self._failures = self.evaluations, 0
+        self._slopes = np.zeros((0, len(x)))
+        try:
+            solution = least_squares(
+                self._vector,
+                x,
+                cast(Any, self._jacobian),  # scipy's hints know no callable here
+                bounds=(self.residuals.lower, self.residuals.upper),
+                method="trf",
+                ftol=COST_TOLERANCE,
+                xtol=STEP_TOLERANCE,
+                gtol=GRADIENT_TOLERANCE,
+                max_nfev=most_evaluations,
+            )
+        except _SameBasin as same:
+            return self._found(self._at, Ending.SAME_BASIN, same.minimum)
+        if solution.status <= 0:
+            return self._found(solution.x, Ending.BUDGET_SPENT)
+        stuck = self._failures > 0.5 * (self.evaluations - self._began)
+        return self._found(solution.x, Ending.STUCK if stuck else Ending.CONVERGED)
+
+    def _found(self, x: Array, ending: Ending, minimum: Found | None = None) -> Found:
+        r = self.residuals.vector(x)
+        return Found(
+            x=x.copy(),
+            cost=0.5 * float(r @ r),
+            residuals=r,
+            slopes=self._slopes,
+            curvature=self._slopes.T @ self._slopes,
+            ending=ending,
+            told=self.turn[0] == 1,
+            minimum=minimum,
+        )
+
+    def _vector(self, x: Array) -> Array:
+        """r(x), condensed; one evaluation."""
+        r = self.residuals.quick(x)[0] if self._quick else self.residuals.vector(x)
+        cost = 0.5 * float(r @ r)
+        self.evaluations += 1
+        self._failures += bool(np.any(r == FAILED_TRIAL))
+        if not self.cost_history or cost < self.cost_history[-1]:
+            self._best = x.copy(), r
+        self.cost_history.append(min([cost, *self.cost_history[-1:]]))
+        if self._progress is not None:
+            self._progress(self._state())
+        return condensed_residuals(r, len(x))
+
+    def _jacobian(self, x: Array) -> Array:
+        """dr/dx, condensed."""
+        known = self.residuals
+        self._at = x.copy()
+        self._slopes = known.quick(x)[1] if self._quick else known.jacobian(x)
+        r = self.residuals.vector(x)
+        gradient, cost = self._slopes.T @ r, 0.5 * float(r @ r)
+        for minimum in self._minima:
+            if minimum.holds(x, cost, gradient):
+                raise _SameBasin(minimum)
+        return condensed_jacobian(r, self._slopes)
+
+    def _state(self) -> Progress:
+        x, r = self._best
+        problem = self.residuals.problem
+        values = problem.values(x).tolist()
+        return Progress(
+            evaluations=self.evaluations,
+            simulations=self.residuals.simulations,
+            cost=self.cost_history[-1],
+            parameters={one.name: v for one, v in zip(problem.free, values, strict=True)},
+            fit_percent=self.residuals.percents(r),
+            search=self.turn[0],
+            searches=self.turn[1],
+        )
