@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .braking import Interval
-from .problem import FreeParameter
+from .loss import Loss
 from .rims_settings import RimsSettings
 from .uncertainty import Uncertainty
+from .variables import FreeParameter
 from .vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -139,16 +140,34 @@ class Verdict:
 
 
 @dataclass(frozen=True, slots=True)
+class PriorCheck:
+    """A prior and what the runs say without it, SI.
+
+    without, without_std_error : by the runs and the other priors; None where they do not tell
+    apart : the runs' less the prior's, in combined standard errors
+    """
+
+    name: str
+    mean: float
+    deviation: float
+    without: float | None
+    without_std_error: float | None
+    apart: float | None
+
+
+@dataclass(frozen=True, slots=True)
 class FittedRun:
     """What was compared in one run, SI.
 
     noise : assumed, by channel
+    discounted : samples beyond the scale of the loss, by channel; none where it is linear
     braking : (begin, end) where the car was taken to brake, s
     """
 
     name: str
     samples: int
     noise: Mapping[str, float]
+    discounted: Mapping[str, int]
     braking: tuple[Interval, ...]
 
 
@@ -195,7 +214,8 @@ class Fit:
     """An identified car and everything known about how good it is.
 
     vehicle : with the identified values
-    cost : half the sum of squared residuals, in units of the noise
+    cost : half the sum of squared residuals as the loss counts them, in units of the noise, priors
+        among them
     errors : of the search's variables, those of `FreeParameter`, in the parameters' order
     fit_percent : by run and channel
     residuals : by run and channel, (samples,) model minus measured, SI
@@ -222,6 +242,8 @@ class Fit:
     runs: tuple[FittedRun, ...]
     starts: int
     minima: tuple[Minimum, ...]
+    loss: Loss
+    priors: tuple[PriorCheck, ...]
     verdict: Verdict
 
 

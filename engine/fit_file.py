@@ -36,12 +36,16 @@ def fit_to_json(fit: Fit) -> dict[str, Any]:
                     "name": run.name,
                     "samples": run.samples,
                     "noise": dict(run.noise),
+                    "discounted": dict(run.discounted),
                     "braking": [list(interval) for interval in run.braking],
                 }
                 for run in fit.runs
             ],
             "traction": fit.traction,
             "settings": asdict(fit.settings),
+            "loss": fit.loss.name,
+            "loss_scale": fit.loss.scale,
+            "priors": [asdict(one) for one in fit.priors],
             "starts": fit.starts,
             "minima": [asdict(one) for one in fit.minima],
             "seconds": fit.seconds,

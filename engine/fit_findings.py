@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .fit import Minimum, ParameterEstimate
-from .problem import ComparedRun
+from .fit import FittedRun, Minimum, ParameterEstimate
+from .problem import ComparedRun, Problem
 from .simulation import fit_percent
 from .spikes import despiked
 from .uncertainty import Uncertainty
@@ -52,6 +52,10 @@ UNIT_RATIOS = {
 }
 """By channel: the ratio of measured to model amplitude that a mistaken unit makes, the factor
 around it that counts, the unit of the numbers and the unit the header claims."""
+
+FEW_OUTLIERS, MANY_OUTLIERS = 0.005, 0.2
+"""Shares of a channel beyond the loss's scale: from the first they are more than the noise's own
+(0.3 % beyond three), from the second no outliers."""
 
 AS_GOOD = 1.02
 """Times the lowest cost up to which another minimum fits about as well: its residuals' rms is a
@@ -172,6 +176,27 @@ def hardly_moving(runs: Sequence[ComparedRun]) -> list[str]:
             for channel, values in seen.measured.items()
         )
     ]
+
+
+def outlier_findings(problem: Problem, runs: Sequence[FittedRun]) -> list[str]:
+    """Sentences on what a loss counts for less: a few outliers, or most of a channel."""
+    loss, found = problem.loss, []
+    for run in runs:
+        for channel, count in run.discounted.items():
+            share = count / run.samples
+            if share > MANY_OUTLIERS:
+                found.append(
+                    f"{100.0 * share:.0f} % of {channel} of run {run.name} lie beyond "
+                    f"{loss.scale:g} noises of the model, too many for outliers: the {loss.name} "
+                    "loss mends no misfit, so check the noise and the car's known data."
+                )
+            elif share > FEW_OUTLIERS:
+                found.append(
+                    f"{count} of {run.samples} samples of {channel} of run {run.name} lie beyond "
+                    f"{loss.scale:g} noises of the model; the {loss.name} loss counts them for "
+                    "less."
+                )
+    return found
 
 
 def minima_findings(minima: Sequence[Minimum]) -> list[str]:

@@ -34,12 +34,14 @@ from .fit_findings import (
     channel_faults,
     hardly_moving,
     minima_findings,
+    outlier_findings,
     poor_fits,
     undetermined_findings,
 )
 from .initial_state import swings_in
 from .multistart import MOST_STARTS, refined_starts, spread
 from .parameters import parameter
+from .prior_checks import disagreements, prior_checks
 from .problem import ComparedRun, FreeParameter, Problem
 from .residuals import FAILED_TRIAL, Residuals, Simulate
 from .search import Found, Search
@@ -68,7 +70,7 @@ SCATTERED_STARTS = 32
 between the bounds."""
 
 MUCH_BETTER = 0.5
-"""Such a car is taken when its squared residuals are below this share of the start's."""
+"""Such a car is taken when its cost is below this share of the start's."""
 
 
 def identify(
@@ -113,7 +115,9 @@ def identify(
     reached = refined_starts(search, x_start, others, most_evaluations)
     solution = reached[0][0]
     r = solution.residuals
-    errors = uncertainty(information(residuals.of_runs(r, solution.slopes)))
+    said = information(residuals.of_runs(r, solution.slopes))
+    errors = uncertainty(sum(residuals.of_priors(), start=said))
+    priors = prior_checks(residuals, solution, said)
     estimates = _estimates(problem, solution.x, errors, beyond=solution.beyond())
     fitted = residuals.model(solution.x)
     driven = _well_driven(problem)
@@ -121,6 +125,7 @@ def identify(
     wrong = bool(faults) or len(driven) < len(problem.runs)
     outcome = Outcome.DOUBTFUL if wrong else _outcome(solution, estimates, residuals)
     converged = outcome in CONVERGED
+    runs = tuple(_fitted_run(seen, residuals, r) for seen in problem.runs)
     minima = tuple(_minimum(ended, residuals) for ended in reached)
     if not converged:
         estimates = tuple(replace(one, determined="no") for one in estimates)
@@ -135,6 +140,8 @@ def identify(
             *_swings(problem, fitted),
             *hardly_moving(problem.runs),
             *minima_findings(minima),
+            *outlier_findings(problem, runs),
+            *disagreements(priors, problem.free),
             *bound_findings(estimates),
         ]
     if converged:
@@ -158,12 +165,11 @@ def identify(
         cost_history=tuple(search.cost_history),
         traction=problem.traction,
         settings=problem.settings,
-        runs=tuple(
-            FittedRun(seen.name, len(seen.inputs.time), dict(seen.noise), seen.inputs.braking)
-            for seen in problem.runs
-        ),
+        runs=runs,
         starts=starts,
         minima=minima,
+        loss=problem.loss,
+        priors=priors,
     )
 
 
@@ -178,7 +184,8 @@ def _usable_start(residuals: Residuals, x: Array) -> tuple[Array, list[str]]:
     """
     r = residuals.vector(x)
     failed = bool(np.any(r == FAILED_TRIAL))
-    if r @ r <= residuals.scatter():
+    cost = residuals.cost(x, r)
+    if cost <= residuals.scatter():
         return x, []
     if not failed and _in_doubt(residuals, x):
         return x, []
@@ -191,9 +198,9 @@ def _usable_start(residuals: Residuals, x: Array) -> tuple[Array, list[str]]:
         ("between the bounds", (residuals.lower, residuals.upper)),
     ):
         trials = [lower + (upper - lower) * share for share in spread]
-        squares = residuals.squares(trials)
-        best = int(np.argmin(squares))
-        if squares[best] < MUCH_BETTER * float(r @ r):
+        costs = residuals.costs(trials)
+        best = int(np.argmin(costs))
+        if costs[best] < MUCH_BETTER * cost:
             return trials[best], [
                 "The start values do not carry the car through the runs, so the fit began from "
                 f"others {where}; check the start values."
@@ -277,6 +284,23 @@ def _estimates(
     return tuple(found)
 
 
+def _fitted_run(seen: ComparedRun, residuals: Residuals, r: Array) -> FittedRun:
+    """What was compared in a run, as data."""
+    loss = residuals.problem.loss
+    discounted = {
+        block.channel: int(np.sum(np.abs(r[block.place]) > loss.scale))
+        for block in residuals.blocks()
+        if block.run == seen.name and loss.name != "linear"
+    }
+    return FittedRun(
+        name=seen.name,
+        samples=len(seen.inputs.time),
+        noise=dict(seen.noise),
+        discounted=discounted,
+        braking=seen.inputs.braking,
+    )
+
+
 def _minimum(ended: list[Found], residuals: Residuals) -> Minimum:
     """A minimum as data, from the searches that ended in it, the lowest first."""
     lowest, problem = ended[0], residuals.problem
@@ -309,7 +333,7 @@ def _outcome(
         return Outcome.BUDGET_SPENT
     if found.ending == Ending.STUCK:
         return Outcome.STUCK
-    if 2.0 * found.cost > residuals.scatter():
+    if found.cost > residuals.scatter():
         return Outcome.ASTRAY
     if any(one.at_bound for one in estimates):
         return Outcome.AT_BOUND

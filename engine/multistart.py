@@ -47,7 +47,7 @@ def refined_starts(
 
     start : refined first and in any case;  others : points, of which the best are refined
     """
-    costs = search.residuals.squares(others) if others else np.zeros(0)
+    costs = search.residuals.costs(others) if others else np.zeros(0)
     best = [k for k in np.argsort(costs, kind="stable")[: REFINED - 1] if np.isfinite(costs[k])]
     trials = [start, *(others[k] for k in best)]
     minima: list[list[Found]] = []

@@ -17,12 +17,15 @@ from .channels import OUTPUT_CHANNELS, Run
 from .equilibrium import static_loads
 from .errors import ProblemError, VehicleError
 from .filters import low_pass, too_coarse
+from .loss import Loss
 from .parameters import ALL_NAMES, PARAMETER_NAMES, damper_starts, default_bounds, parameter
+from .priors import Prior, checked_prior
 from .rims import RimsInputs, filtered_outputs, prepare
 from .rims_settings import RimsSettings
 from .run_notes import DEFAULT_NOISE
 from .simulation import Traction
 from .units import after_number
+from .variables import FreeParameter
 from .vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -34,60 +37,8 @@ MOVES = 1.2
 FAST = 5.0
 """Frequency, Hz, above which a channel shows its noise."""
 
-FARTHEST = 1e3
-"""Factor from a value to the end of its interval beyond which the end is not worth telling."""
-
 SENSORS_BEST = 0.02
 """Share of the default noise below which no sensor's own noise is taken to lie."""
-
-
-@dataclass(frozen=True, slots=True)
-class FreeParameter:
-    """A number to be found, in SI: dotted path, start value and bounds."""
-
-    name: str
-    start: float
-    lower: float
-    upper: float
-
-    @property
-    def scale(self) -> float:
-        """Typical size: |start|, at least a twentieth of the range between the bounds."""
-        return max(abs(self.start), 0.05 * (self.upper - self.lower))
-
-    @property
-    def logarithmic(self) -> bool:
-        """Whether the optimiser works on the logarithm: for all but angles and bounds at zero."""
-        return self.lower * self.upper > 0.0 and not self.name.endswith("pivot.angle")
-
-    def variable(self, value: float) -> float:
-        """The optimiser's variable: log |value / scale|, or value / scale."""
-        ratio = value / self.scale
-        return math.log(abs(ratio)) if self.logarithmic else ratio
-
-    def value(self, variable: float) -> float:
-        """The parameter at a variable, kept between the bounds against rounding."""
-        ratio = math.copysign(math.exp(variable), self.lower) if self.logarithmic else variable
-        return min(max(ratio * self.scale, self.lower), self.upper)
-
-    def slope(self, variable: float) -> float:
-        """d value / d variable."""
-        return self.value(variable) if self.logarithmic else self.scale
-
-    def interval(self, variable: float, below: float, above: float) -> tuple[float, float]:
-        """Values from so far below a variable to so far above it, bounds aside. An end is infinite
-        where it is, or where the logarithm puts it a factor FARTHEST or more away.
-        """
-        low, high = self._end(variable, -below), self._end(variable, above)
-        return (low, high) if low < high else (high, low)
-
-    def _end(self, variable: float, change: float) -> float:
-        if not self.logarithmic:
-            return (variable + change) * self.scale
-        sign = math.copysign(1.0, self.lower)
-        if abs(change) > math.log(FARTHEST):
-            return sign * change * math.inf
-        return sign * math.exp(variable + change) * self.scale
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +64,8 @@ class Problem:
     free: tuple[FreeParameter, ...]
     traction: Traction
     settings: RimsSettings
+    loss: Loss = Loss()
+    priors: tuple[Prior, ...] = ()
 
     @classmethod
     def build(
@@ -128,6 +81,8 @@ class Problem:
         outputs: Sequence[str] | Mapping[str, Sequence[str]] | None = None,
         traction: Traction = "exact",
         settings: RimsSettings | None = None,
+        loss: Loss | None = None,
+        priors: Mapping[str, tuple[float, float]] | None = None,
     ) -> "Problem":
         """A problem from its parts, or one sentence on what is wrong with them.
 
@@ -137,6 +92,8 @@ class Problem:
             damper_starts where its damper is linear
         noise : standard deviation by channel, over what the runs state, over DEFAULT_NOISE
         outputs : channels to compare, for all runs or by run name; all that a run has without
+        loss : how much a residual counts; the linear one without
+        priors : (mean, standard deviation) of free parameters by name, SI
 
         Raises ProblemError, ParameterError, MeasurementError or VehicleError.
         """
@@ -170,7 +127,11 @@ class Problem:
             for channel in seen.measured
         ):
             raise ProblemError(_at_rest(compared))
-        return cls(vehicle, compared, parameters, traction, settings)
+        known = tuple(
+            checked_prior(name, prior, parameters)
+            for name, prior in _by_name(priors or {}, "prior").items()
+        )
+        return cls(vehicle, compared, parameters, traction, settings, loss or Loss(), known)
 
     def values(self, x: Array) -> Array:
         """The free parameters at the optimiser's variables x."""

@@ -1,9 +1,8 @@
 """Residuals of an identification problem and their derivatives.
 
-The optimiser's variable is x = log |p / s| for stiffness, damping and pivot distance p of scale s,
-x = p / s for angles and for bounds at or across zero (FreeParameter): a step of 1 is about 100 %
-everywhere, and the narrow valley along which a bar's effect K_tor / d^2 stays the same, curved
-in (K_tor, d), is straight in their logarithms. Over all runs and compared channels
+In the optimiser's variables (`variables`) the narrow valley along which a bar's effect K_tor / d^2
+stays the same, curved in (K_tor, d), is straight in their logarithms. Over all runs and compared
+channels
 
     r(x) = (model(x) - measured) / noise,
 
@@ -28,6 +27,7 @@ from numpy.typing import NDArray
 
 from .car_rows import car_row
 from .channels import OUTPUT_CHANNELS
+from .condensed import triangle
 from .errors import Cancelled
 from .filters import smoothed
 from .kernels.lanes import BATCH
@@ -35,7 +35,7 @@ from .problem import Problem
 from .rims import RimsInputs
 from .simulation import Traction, fit_percent
 from .stability import check_rims_step
-from .uncertainty import RunResiduals
+from .uncertainty import Information, RunResiduals
 
 Array = NDArray[np.float64]
 Simulate = Callable[[Array, RimsInputs, Traction], Array]
@@ -46,6 +46,10 @@ DIFFERENCE = 1e-4
 
 QUICK_DIFFERENCE = 1e-6
 """Step of the differences of first order of x, whose error is of order h + 1e-13 / h."""
+
+LEAST_WEIGHT = 1e-3
+"""Mean weight of a channel from which on the errors follow it; below, nearly all of its samples
+lie where the loss has flattened out."""
 
 FAILED_TRIAL = 1e8
 """Residual of a failed car, in units of the noise."""
@@ -106,6 +110,8 @@ class Residuals:
         self._cancelled = cancelled
         self._last: tuple[Array, Array] | None = None
         self._quick: tuple[Array, Array] | None = None
+        places = {one.name: place for place, one in enumerate(problem.free)}
+        self._priors = [(one, places[one.name]) for one in problem.priors]
 
     def blocks(self) -> list[Block]:
         """The blocks of the residual vector, in order."""
@@ -117,22 +123,43 @@ class Residuals:
                 begin += len(measured)
         return found
 
-    def of_runs(self, r: Array, jacobian: Array) -> list[RunResiduals]:
-        """Residuals and Jacobian, all blocks above each other, run by run."""
+    def of_runs(self, r: Array, slopes: Array) -> list[RunResiduals]:
+        """What the errors follow from, run by run: residuals and Jacobian, of all blocks above each
+        other.
+
+        Of each channel these are the scores psi and the slopes, by the root of the mean w (`loss`),
+        so that J^T J is the cost's mean second derivative and J^T r holds the scores; with a linear
+        loss r and dr/dx themselves.
+        """
+        psi, w = self.problem.loss.scores(r)
         found, begin = [], 0
         for seen in self.problem.runs:
             channels, samples = len(seen.measured), len(seen.inputs.time)
             place = slice(begin, begin + channels * samples)
             time = seen.inputs.time
+            mean = np.mean(w[place].reshape(channels, samples), axis=1)
+            root = np.sqrt(np.maximum(mean, LEAST_WEIGHT))[:, np.newaxis]
             found.append(
                 RunResiduals(
-                    r[place].reshape(channels, samples),
-                    jacobian[place].reshape(channels, samples, -1),
+                    psi[place].reshape(channels, samples) / root,
+                    slopes[place].reshape(channels, samples, -1) * root[:, :, np.newaxis],
                     float(time[-1] - time[0]) / (samples - 1),
                 )
             )
             begin = place.stop
         return found
+
+    def of_priors(self) -> list[Information]:
+        """What each prior says: its error is what it states, so that its scatter is its J^T J."""
+        return [
+            Information(
+                root=triangle(row[np.newaxis]),
+                scatter=np.outer(row, row),
+                samples=1.0,
+                freedom=0.0,
+            )
+            for row in self.prior_slopes()
+        ]
 
     def model(self, x: Array) -> dict[str, dict[str, Array]]:
         """The model's histories by run and channel; not a number where the car fails."""
@@ -164,10 +191,43 @@ class Residuals:
             self._quick = x.copy(), np.nan_to_num(columns)
         return self.vector(x), self._quick[1]
 
-    def squares(self, trials: Sequence[Array]) -> Array:
-        """Sum of squared residuals at each of many points, infinite where the car fails."""
+    def costs(self, trials: Sequence[Array]) -> Array:
+        """The cost at each of many points, infinite where the car fails."""
         rows = self._batch(trials)
-        return np.nan_to_num(np.einsum("ij,ij->i", rows, rows), nan=np.inf)
+        of_priors = [0.5 * float(np.sum(self.prior_rows(x) ** 2)) for x in trials]
+        return np.nan_to_num(self.problem.loss.costs(rows), nan=np.inf) + np.array(of_priors)
+
+    def cost(self, x: Array, r: Array) -> float:
+        """Half the sum of the residuals' and the priors' squares as the loss counts them; a failed
+        car is no outlier and costs the squares themselves.
+        """
+        failed = np.any(r == FAILED_TRIAL)
+        of_runs = 0.5 * float(r @ r) if failed else float(self.problem.loss.costs(r))
+        return of_runs + 0.5 * float(np.sum(self.prior_rows(x) ** 2))
+
+    def prior_rows(self, x: Array) -> Array:
+        """The priors' residuals, (priors,)."""
+        free = self.problem.free
+        return np.array([one.residual(free[k], float(x[k])) for one, k in self._priors])
+
+    def prior_slopes(self) -> Array:
+        """Their derivative, (priors, parameters), the same everywhere."""
+        slopes = np.zeros((len(self._priors), len(self.lower)))
+        for row, (one, k) in enumerate(self._priors):
+            slopes[row, k] = one.weight(self.problem.free[k])
+        return slopes
+
+    def reweighted(self, x: Array, r: Array) -> tuple[Array, Array]:
+        """Runs and priors in one least-squares problem with the cost's derivatives: its residuals,
+        and factors of the rows of J (`reweighted_slopes`).
+        """
+        failed = np.any(r == FAILED_TRIAL)
+        rows, root = (r, np.ones_like(r)) if failed else self.problem.loss.reweighted(r)
+        return np.concatenate([rows, self.prior_rows(x)]), root
+
+    def reweighted_slopes(self, slopes: Array, root: Array) -> Array:
+        """The Jacobian of that problem, out of that of the runs (samples, parameters)."""
+        return np.concatenate([slopes * root[:, np.newaxis], self.prior_slopes()])
 
     def percents(self, r: Array) -> dict[str, dict[str, float]]:
         """Fit percent by run and channel, of residuals r."""
@@ -179,9 +239,9 @@ class Residuals:
         return found
 
     def scatter(self) -> float:
-        """Sum of squared residuals of a model that stays at each channel's mean."""
+        """Cost of a model that stays at each channel's mean."""
         return sum(
-            float(np.sum(((block.measured - np.mean(block.measured)) / block.noise) ** 2))
+            float(self.problem.loss.costs((block.measured - np.mean(block.measured)) / block.noise))
             for block in self.blocks()
         )
 

@@ -1,8 +1,12 @@
 """The search for a minimum: scipy's trust-region reflective least squares between bounds.
 
 The optimiser is handed condensed residuals; what it asks for is kept with the result, so that
-nothing is simulated twice. One `Search` may refine several starts; a refinement that falls into a
-minimum already found is cut short, if the caller asks for that.
+nothing is simulated twice. A loss works on single samples and cannot be left to the optimiser: the
+residuals are reweighted before they are condensed (`loss`), and the cost, which their squares do
+not add up to, is handed over in a row of its own.
+
+One `Search` may refine several starts. One that falls into a minimum already found is cut short, if
+the caller asks for that.
 """
 
 from collections.abc import Callable, Sequence
@@ -36,9 +40,9 @@ SAME_POINT = 0.1
 class Found:
     """Where one refinement ended.
 
-    cost : half the sum of squared residuals, in units of the noise
+    cost : as `Residuals.cost`
     residuals, slopes : (samples,) r and (samples, n) dr/dx there
-    curvature : (n, n) J^T J, the cost's second derivative as Gauss and Newton have it
+    rows, jacobian : of the condensed, reweighted problem, (n + 1,) and (n + 1, n)
     told : whether it began from the problem's start values
     minimum : in whose basin it was cut short
     """
@@ -47,10 +51,16 @@ class Found:
     cost: float
     residuals: Array
     slopes: Array
-    curvature: Array
+    rows: Array
+    jacobian: Array
     ending: Ending
     told: bool
     minimum: "Found | None" = None
+
+    @property
+    def curvature(self) -> Array:
+        """(n, n) the cost's second derivative as Gauss and Newton have it."""
+        return self.jacobian.T @ self.jacobian
 
     def variance(self) -> float:
         """Mean square of the residuals over their degrees of freedom."""
@@ -65,7 +75,7 @@ class Found:
 
     def beyond(self) -> Array:
         """Where the search would go on to were there no bounds."""
-        return self.x - np.linalg.lstsq(self.slopes, self.residuals, rcond=DIRECTION_TOLERANCE)[0]
+        return self.x - np.linalg.lstsq(self.jacobian, self.rows, rcond=DIRECTION_TOLERANCE)[0]
 
     def holds(self, x: Array, cost: float, gradient: Array) -> bool:
         """Whether x lies where the quadratic about this minimum is the cost: its basin.
@@ -80,6 +90,14 @@ class Found:
             return False
         missed = away - np.linalg.pinv(self.curvature, hermitian=True) @ gradient
         return float(missed @ self.curvature @ missed) <= max(2.0 * QUADRATIC**2 * rise, some)
+
+
+def _cost_alone(z: Array) -> Array:
+    """scipy's form of a loss, (3, rows): the last row of squares z is the cost, the others none."""
+    rho = np.zeros((3, len(z)))
+    rho[0, -1] = z[-1]
+    rho[1] = 1.0
+    return rho
 
 
 class _SameBasin(Exception):
@@ -126,6 +144,7 @@ class Search:
                 cast(Any, self._jacobian),  # scipy's hints know no callable here
                 bounds=(self.residuals.lower, self.residuals.upper),
                 method="trf",
+                loss=cast(Any, _cost_alone),
                 ftol=COST_TOLERANCE,
                 xtol=STEP_TOLERANCE,
                 gtol=GRADIENT_TOLERANCE,
@@ -140,21 +159,24 @@ class Search:
 
     def _found(self, x: Array, ending: Ending, minimum: Found | None = None) -> Found:
         r = self.residuals.vector(x)
+        rows, root = self.residuals.reweighted(x, r)
+        slopes = self.residuals.reweighted_slopes(self._slopes, root)
         return Found(
             x=x.copy(),
-            cost=0.5 * float(r @ r),
+            cost=self.residuals.cost(x, r),
             residuals=r,
             slopes=self._slopes,
-            curvature=self._slopes.T @ self._slopes,
+            rows=condensed_residuals(rows, len(x)),
+            jacobian=condensed_jacobian(rows, slopes),
             ending=ending,
             told=self.turn[0] == 1,
             minimum=minimum,
         )
 
     def _vector(self, x: Array) -> Array:
-        """r(x), condensed; one evaluation."""
+        """The reweighted residuals, condensed, and the cost's root; one evaluation."""
         r = self.residuals.quick(x)[0] if self._quick else self.residuals.vector(x)
-        cost = 0.5 * float(r @ r)
+        cost = self.residuals.cost(x, r)
         self.evaluations += 1
         self._failures += bool(np.any(r == FAILED_TRIAL))
         if not self.cost_history or cost < self.cost_history[-1]:
@@ -162,19 +184,22 @@ class Search:
         self.cost_history.append(min([cost, *self.cost_history[-1:]]))
         if self._progress is not None:
             self._progress(self._state())
-        return condensed_residuals(r, len(x))
+        rows, _ = self.residuals.reweighted(x, r)
+        return np.append(condensed_residuals(rows, len(x)), np.sqrt(2.0 * cost))
 
     def _jacobian(self, x: Array) -> Array:
-        """dr/dx, condensed."""
+        """Their derivative; the cost's row has none."""
         known = self.residuals
         self._at = x.copy()
         self._slopes = known.quick(x)[1] if self._quick else known.jacobian(x)
-        r = self.residuals.vector(x)
-        gradient, cost = self._slopes.T @ r, 0.5 * float(r @ r)
+        r = known.vector(x)
+        rows, root = known.reweighted(x, r)
+        slopes = known.reweighted_slopes(self._slopes, root)
+        gradient, cost = slopes.T @ rows, known.cost(x, r)
         for minimum in self._minima:
             if minimum.holds(x, cost, gradient):
                 raise _SameBasin(minimum)
-        return condensed_jacobian(r, self._slopes)
+        return np.vstack([condensed_jacobian(rows, slopes), np.zeros(len(x))])
 
     def _state(self) -> Progress:
         x, r = self._best

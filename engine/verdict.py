@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from .combinations import COMBINATIONS, Combination
 from .fit import CombinationEstimate, Direction, ParameterEstimate, Verdict, determined
 from .parameters import parameter
-from .problem import FARTHEST
 from .uncertainty import Uncertainty
 from .units import after_number
+from .variables import FARTHEST
 from .vehicle import Vehicle
 
 Array = NDArray[np.float64]

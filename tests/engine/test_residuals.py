@@ -99,7 +99,7 @@ def test_a_failed_car_has_large_finite_residuals():
     residuals = Residuals(asked, failing(lambda values: slice(None)))
     x = start_of(asked)
     assert np.all(residuals.vector(x) == FAILED_TRIAL)
-    assert np.all(np.isinf(residuals.squares([x])))
+    assert np.all(np.isinf(residuals.costs([x])))
     assert np.all(np.isnan(residuals.model(x)["lap"]["chassis.z"]))
 
 
@@ -160,7 +160,7 @@ def test_a_car_that_bounds_admit_but_geometry_does_not_is_a_failed_trial():
         stand_in.simulate,
     )
     assert np.all(residuals.vector(residuals.lower) == FAILED_TRIAL)
-    assert list(np.isfinite(residuals.squares([residuals.lower, residuals.upper]))) == [False, True]
+    assert list(np.isfinite(residuals.costs([residuals.lower, residuals.upper]))) == [False, True]
 
 
 def test_long_runs_are_simulated_in_batches_of_whole_lanes():
@@ -172,5 +172,5 @@ def test_long_runs_are_simulated_in_batches_of_whole_lanes():
         return stand_in.simulate(cars, inputs, traction)
 
     residuals = Residuals(asked, simulate)
-    residuals.squares([start_of(asked)] * 20)
+    residuals.costs([start_of(asked)] * 20)
     assert sorted(sizes) == [4, 8, 8]

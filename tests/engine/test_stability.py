@@ -227,11 +227,11 @@ def test_a_fit_is_refused_an_unstable_start_and_counts_an_unstable_trial_as_fail
         Residuals(Problem.build(car, [run], [name], bounds=bounds, start=STIFF), rims_batch)
     shorter = RimsSettings(step=0.001)
     asked = Problem.build(car, [run], [name], bounds=bounds, start=STIFF, settings=shorter)
-    assert np.isfinite(Residuals(asked, rims_batch).squares([np.zeros(1)])[0])
+    assert np.isfinite(Residuals(asked, rims_batch).costs([np.zeros(1)])[0])
 
     residuals = Residuals(Problem.build(car, [run], [name], bounds=bounds), rims_batch)
-    squares = residuals.squares([np.zeros(1), residuals.upper])
-    assert list(np.isfinite(squares)) == [True, False]
+    costs = residuals.costs([np.zeros(1), residuals.upper])
+    assert list(np.isfinite(costs)) == [True, False]
 
 
 def test_brakes_near_standstill_bound_the_step():

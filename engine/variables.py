@@ -1,0 +1,77 @@
+"""The numbers that a fit looks for, and the variables in which the optimiser does.
+
+The optimiser's variable is x = log |p / s| for stiffness, damping and pivot distance p of scale s,
+x = p / s for angles and for bounds at or across zero: a step of 1 is about 100 % everywhere.
+"""
+
+import math
+from dataclasses import dataclass
+
+from .parameters import parameter
+
+FARTHEST = 1e3
+"""Factor from a value to the end of its interval beyond which the end is not worth telling."""
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A number to be found, in SI: its name, start value and bounds."""
+
+    name: str
+    start: float
+    lower: float
+    upper: float
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the number."""
+        raise NotImplementedError
+
+    @property
+    def scale(self) -> float:
+        """Typical size: |start|, at least a twentieth of the range between the bounds."""
+        return max(abs(self.start), 0.05 * (self.upper - self.lower))
+
+    @property
+    def logarithmic(self) -> bool:
+        """Whether the optimiser works on the logarithm: for all but angles and bounds at zero."""
+        return self.lower * self.upper > 0.0 and not self.name.endswith("pivot.angle")
+
+    def variable(self, value: float) -> float:
+        """The optimiser's variable: log |value / scale|, or value / scale."""
+        ratio = value / self.scale
+        return math.log(abs(ratio)) if self.logarithmic else ratio
+
+    def value(self, variable: float) -> float:
+        """The number at a variable, kept between the bounds against rounding."""
+        ratio = math.copysign(math.exp(variable), self.lower) if self.logarithmic else variable
+        return min(max(ratio * self.scale, self.lower), self.upper)
+
+    def slope(self, variable: float) -> float:
+        """d value / d variable."""
+        return self.value(variable) if self.logarithmic else self.scale
+
+    def interval(self, variable: float, below: float, above: float) -> tuple[float, float]:
+        """Values from so far below a variable to so far above it, bounds aside. An end is infinite
+        where it is, or where the logarithm puts it a factor FARTHEST or more away.
+        """
+        low, high = self._end(variable, -below), self._end(variable, above)
+        return (low, high) if low < high else (high, low)
+
+    def _end(self, variable: float, change: float) -> float:
+        if not self.logarithmic:
+            return (variable + change) * self.scale
+        sign = math.copysign(1.0, self.lower)
+        if abs(change) > math.log(FARTHEST):
+            return sign * change * math.inf
+        return sign * math.exp(variable + change) * self.scale
+
+
+@dataclass(frozen=True, slots=True)
+class FreeParameter(Variable):
+    """A parameter of the car, by its dotted path."""
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the parameter."""
+        return parameter(self.name).unit
