@@ -16,9 +16,10 @@ from contextlib import contextmanager
 from difflib import get_close_matches
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, get_args
 
 from ..engine.errors import RideError
+from ..engine.search_settings import LossName
 from .plants import PLANTS
 
 BAD_INPUT = 2
@@ -250,6 +251,20 @@ def _add_identification(command: Parser) -> None:
     )
     command.add_argument("--bounds", metavar="NAME=LOW:HIGH", **several, help="SI units")
     command.add_argument("--start", metavar="NAME=VALUE", **several, help="SI units")
+    command.add_argument("--starts", metavar="N", help="try so many starts between the bounds")
+    command.add_argument("--seed", metavar="N", type=_seed, help="other starts")
+    command.add_argument(
+        "--loss", choices=get_args(LossName), help="how much outliers count; linear unless told"
+    )
+    command.add_argument(
+        "--loss-scale", metavar="NOISES", help="from which on they count less; 3 unless told"
+    )
+    command.add_argument(
+        "--prior",
+        metavar="NAME=VALUE~DEVIATION",
+        **several,
+        help="known from a drawing, SI units; or ~PERCENT%%",
+    )
     _add_rims_mode(command, "--braking lap_2.csv=6.2:9.8")
     _add_step(command, "5 ms unless told")
     _add_noise(command, "noise of the recordings")

@@ -21,6 +21,12 @@ from .worker import Report
 
 KIND = "identification"
 
+UNTOLD = {
+    name: IdentificationRequest.model_fields[name].get_default()
+    for name in ("starts", "seed", "loss", "loss_scale", "priors")
+}
+"""What holds of a job kept from before these could be told."""
+
 
 def identification(store: Store, recordings: Recordings) -> Kind:
     """The job kind, bound to where its recordings are kept."""
@@ -30,7 +36,7 @@ def identification(store: Store, recordings: Recordings) -> Kind:
             replace(store.measurement(job.session, run["id"]), noise=run["noise"])
             for run in job.spec["runs"]
         ]
-        return {**job.spec, "runs": marked_runs(job.spec, kept, recordings)}
+        return {**UNTOLD, **job.spec, "runs": marked_runs(job.spec, kept, recordings)}
 
     return Kind(task=identify_runs, payload=payload)
 
@@ -41,7 +47,7 @@ def as_asked(request: IdentificationRequest) -> str:
     for role in ("free", "fixed"):
         if form[role] is not None:
             form[role] = sorted(parameter(name).name for name in form[role])
-    for given in ("bounds", "start"):
+    for given in ("bounds", "start", "priors"):
         form[given] = sorted([parameter(name).name, value] for name, value in form[given].items())
     return digest(form)
 
@@ -56,6 +62,7 @@ def filled_in(spec: Mapping[str, Any], problem: Any) -> dict[str, Any]:
         "fixed": [name for name in PARAMETER_NAMES if name not in free],
         "bounds": {one.name: [one.lower, one.upper] for one in problem.free},
         "start": {name: problem.vehicle.value(name) for name in ALL_NAMES if name in started},
+        "priors": {one.name: [one.mean, one.deviation] for one in problem.priors},
     }
 
 
@@ -68,6 +75,7 @@ def marked_runs(
 
 def build_problem(spec: Mapping[str, Any], runs: list[Run]) -> Any:
     """The engine's problem; raises what a person can mend."""
+    from ..engine.loss import Loss
     from ..engine.problem import Problem
     from ..engine.residuals import check_start
     from ..engine.rims_settings import RimsSettings
@@ -83,6 +91,8 @@ def build_problem(spec: Mapping[str, Any], runs: list[Run]) -> Any:
         noise=spec["noise"],
         traction=spec["traction"],
         settings=RimsSettings(**spec["settings"]),
+        loss=Loss(spec["loss"], spec["loss_scale"]),
+        priors={name: (mean, deviation) for name, (mean, deviation) in spec["priors"].items()},
     )
     check_start(problem)
     return problem
@@ -105,10 +115,18 @@ def identify_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -
                 "evaluations": now.evaluations,
                 "parameters": dict(now.parameters),
                 "fit_percent": {run: dict(of) for run, of in now.fit_percent.items()},
+                "search": now.search,
+                "searches": now.searches,
             }
         )
 
-    fit = identify(build_problem(payload, payload["runs"]), progress=progress, cancelled=cancelled)
+    fit = identify(
+        build_problem(payload, payload["runs"]),
+        progress=progress,
+        cancelled=cancelled,
+        starts=payload["starts"],
+        seed=payload["seed"],
+    )
     return fit_to_json(fit)
 
 

@@ -7,6 +7,7 @@ from .access import SessionId
 from .errors import InvalidRequest
 from .identification_job import (
     KIND,
+    UNTOLD,
     as_asked,
     build_problem,
     check_budget,
@@ -17,13 +18,16 @@ from .job_routes import View, job_router, submitted
 from .schemas import IdentificationRequest
 from .services import Services, Shared
 
-ASKED = ("runs", "free", "fixed", "bounds", "start", "noise", "traction", "settings", "braking")
+ASKED = (
+    *("runs", "free", "fixed", "bounds", "start", "noise", "traction", "settings", "braking"),
+    *("starts", "seed", "loss", "loss_scale", "priors"),
+)
 """Fields of a request that its job shows, with what held untold filled in; of each run its id, its
 name and the noise that was stated of it."""
 
 VIEW = View(
     KIND,
-    asked=lambda job: {name: job.spec[name] for name in ASKED},
+    asked=lambda job: {name: (UNTOLD | job.spec)[name] for name in ASKED},
     result=lambda job: {"vehicle": job.spec["vehicle"], "result": job.result},
 )
 

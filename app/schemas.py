@@ -22,6 +22,13 @@ from pydantic_core import PydanticCustomError
 
 from ..engine import rims_settings
 from ..engine.rims_settings import LOWEST_CUTOFF, InitialState, RimsSettings
+from ..engine.search_settings import (
+    DEFAULT_SCALE,
+    LARGEST_SCALE,
+    MOST_STARTS,
+    SMALLEST_SCALE,
+    LossName,
+)
 from ..engine.step_limits import LONGEST_SAMPLE_STEP, LONGEST_STEP, SHORTEST_STEP
 
 Number = Annotated[FiniteFloat, Strict()]
@@ -239,6 +246,9 @@ class IdentificationRequest(WireForm):
     """Find parameters of the session's car (or of another start) from measurements.
 
     braking : by measurement, (begin, end) where the car brakes, s; for others what a_x shows
+    starts, seed : points tried as starts, the told one and others between the bounds
+    loss, loss_scale : how much outliers count, and from how many noises on they are ones
+    priors : by parameter its mean and standard deviation, known before the runs, SI
     """
 
     runs: Annotated[list[Name], Field(max_length=20)]
@@ -251,4 +261,9 @@ class IdentificationRequest(WireForm):
     traction: Traction = "exact"
     settings: RimsSettingsForm = RimsSettingsForm()
     braking: Annotated[dict[Name, Intervals], Field(max_length=20)] = {}
+    starts: Annotated[Whole, Field(ge=1, le=MOST_STARTS)] = 1
+    seed: Seed = 0
+    loss: LossName = "linear"
+    loss_scale: Annotated[Number, Field(ge=SMALLEST_SCALE, le=LARGEST_SCALE)] = DEFAULT_SCALE
+    priors: Annotated[dict[Name, tuple[Number, Number]], Field(max_length=50)] = {}
     key: Name | None = None

@@ -39,12 +39,13 @@ from .fit_findings import (
     undetermined_findings,
 )
 from .initial_state import swings_in
-from .multistart import MOST_STARTS, refined_starts, spread
+from .multistart import refined_starts, spread
 from .parameters import parameter
 from .prior_checks import disagreements, prior_checks
 from .problem import ComparedRun, FreeParameter, Problem
 from .residuals import FAILED_TRIAL, Residuals, Simulate
 from .search import Found, Search
+from .search_settings import MOST_STARTS
 from .simulation import rims_batch
 from .uncertainty import Uncertainty, information, uncertainty
 from .verdict import verdict, without_verdict

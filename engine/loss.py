@@ -19,22 +19,16 @@ Least squares on reweighted residuals has this cost's gradient and, positive, it
 """
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .errors import ProblemError
+from .search_settings import DEFAULT_SCALE, LARGEST_SCALE, SMALLEST_SCALE, LossName
 
 Array = NDArray[np.float64]
-LossName = Literal["linear", "soft_l1", "huber", "cauchy", "arctan"]
 
-DEFAULT_SCALE = 3.0
-"""Noises from which on a residual counts for less: Gaussian noise goes there in 0.3 % of samples,
-so that an estimate from clean runs loses less than a thousandth of its precision, and where noise
-was stated at half its size still less than a twentieth."""
-
-SMALLEST_SCALE, LARGEST_SCALE = 0.01, 1e6
 EPSILON = float(np.finfo(np.float64).eps)
 
 

@@ -17,7 +17,6 @@ from .search import SAME_POINT, Found, Search
 
 Array = NDArray[np.float64]
 
-MOST_STARTS = 1024
 REFINED = 8
 """Searches run to their end, that from the told start among them."""
 

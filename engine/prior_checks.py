@@ -1,12 +1,13 @@
 """Whether the runs agree with what was known before them.
 
-The cost at its minimum is a parabola; without the prior of parameter k, of residual q and slope w
-in the optimiser's variable x, its minimum lies at
+Without the prior of parameter k, of residual q and slope w in the optimiser's variable x, the cost
+falls on from its minimum, with the gradient -w q in x_k; by its second derivative H from runs and
+other priors its minimum would be
 
-    x_k + (q / w) b / (1 - b),    b = w^2 (H^-1)_kk,
+    x + H^-1 e_k w q.
 
-H the second derivative with all priors: b is the prior's share of what is known of x_k. That value
-has the error that runs and other priors leave it, and the prior has 1 / w; the two are independent.
+x_k there has the error that runs and other priors leave it, by the residuals there (those at the
+minimum hold the very disagreement), and the prior has 1 / w; the two are independent.
 """
 
 from collections.abc import Sequence
@@ -16,15 +17,12 @@ import numpy as np
 from .fit import PriorCheck
 from .residuals import Residuals
 from .search import Found
-from .uncertainty import Information, uncertainty
+from .uncertainty import DIRECTION_TOLERANCE, Information, information, uncertainty
 from .units import after_number
 from .variables import Variable
 
 DISAGREE = 3.0
 """Combined standard errors beyond which the runs and a prior disagree."""
-
-ALL_OF_IT = 0.999
-"""Share of a prior from which on the runs say nothing."""
 
 
 def prior_checks(residuals: Residuals, found: Found, said: Information) -> tuple[PriorCheck, ...]:
@@ -33,21 +31,22 @@ def prior_checks(residuals: Residuals, found: Found, said: Information) -> tuple
     said : by the runs
     """
     problem = residuals.problem
-    inverse = np.linalg.pinv(found.curvature, hermitian=True)
     rows, weights = residuals.prior_rows(found.x), residuals.prior_slopes()
     told = residuals.of_priors()
     checks = []
     for row, prior in enumerate(problem.priors):
         k = int(np.flatnonzero(weights[row])[0])
-        one, weight = problem.free[k], float(weights[row, k])
-        share = weight**2 * float(inverse[k, k])
-        others = uncertainty(sum((*told[:row], *told[row + 1 :]), start=said))
-        error = float(others.std_error[k])
-        if share > ALL_OF_IT or not np.isfinite(error):
+        one, weight, q = problem.free[k], float(weights[row, k]), float(rows[row])
+        others = (*told[:row], *told[row + 1 :])
+        inverse = np.linalg.pinv(sum(others, start=said).root, rcond=DIRECTION_TOLERANCE)
+        step = inverse @ inverse[k] * weight * q
+        there = information(residuals.of_runs(found.residuals + found.slopes @ step, found.slopes))
+        error = float(uncertainty(sum(others, start=there)).std_error[k])
+        if not np.isfinite(error):
             checks.append(PriorCheck(prior.name, prior.mean, prior.deviation, None, None, None))
             continue
-        away = float(rows[row]) / weight / (1.0 - share)
-        x = one.variable(prior.mean) + away
+        x = float(found.x[k] + step[k])
+        away = x - one.variable(prior.mean)
         checks.append(
             PriorCheck(
                 name=prior.name,

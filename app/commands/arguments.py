@@ -1,5 +1,5 @@
-"""What is written in arguments: NAME=VALUE, NAME=LOW:HIGH, NAME=LOW:HIGH:COUNT, [RUN=]BEGIN:END, a
-frequency, a whole number.
+"""What is written in arguments: NAME=VALUE, NAME=LOW:HIGH, NAME=LOW:HIGH:COUNT,
+NAME=VALUE~DEVIATION, [RUN=]BEGIN:END, a frequency, a whole number.
 """
 
 import math
@@ -12,11 +12,13 @@ from typing import Any
 from ...engine.braking import Interval
 from ...engine.designs import Spaced
 from ...engine.errors import RideError
+from ...engine.loss import Loss
 from ...engine.parameters import number_path, parameter
 from ...engine.rims_settings import RimsSettings
 
 VALUE = "NAME=VALUE in SI units"
 LIMITS = "NAME=LOW:HIGH in SI units"
+PRIOR = "NAME=VALUE~DEVIATION in SI units, or ~PERCENT%"
 LEVELS = "NAME=LOW:HIGH:COUNT or NAME=V1,V2,... in SI units"
 FREQUENCY = "a frequency in Hz, or none"
 INTERVAL = "BEGIN:END in seconds, or none"
@@ -46,6 +48,33 @@ def bounds(assignments: Iterable[str]) -> dict[str, tuple[float, float]]:
         name, text = _assigned(assignment, argument, LIMITS, limits)
         limits[name] = _two_numbers(text, argument, LIMITS)
     return limits
+
+
+def priors(assignments: Iterable[str]) -> dict[str, tuple[float, float]]:
+    """(mean, standard deviation) by parameter, out of NAME=VALUE~DEVIATION or ~PERCENT%."""
+    known = {}
+    for assignment in assignments:
+        argument = f"--prior {assignment}"
+        name, text = _assigned(assignment, argument, PRIOR, known)
+        first, tilde, second = text.partition("~")
+        if not tilde:
+            raise ArgumentError(f"{argument} lacks a standard deviation; write {PRIOR}.")
+        mean = _number(first, argument, PRIOR)
+        if second.endswith("%"):
+            known[name] = mean, 0.01 * _number(second[:-1], argument, PRIOR) * abs(mean)
+        else:
+            known[name] = mean, _number(second, argument, PRIOR)
+    return known
+
+
+def loss(options: Namespace) -> Loss:
+    """How much a residual counts."""
+    if options.loss_scale is None:
+        return Loss(options.loss or "linear")
+    if options.loss in (None, "linear"):
+        raise ArgumentError("--loss-scale needs a loss that bends; add e.g. --loss huber.")
+    argument = f"--loss-scale {options.loss_scale}"
+    return Loss(options.loss, _number(options.loss_scale, argument, "a number of noises"))
 
 
 def ranges(assignments: Iterable[str]) -> dict[str, tuple[float, float]]:

@@ -13,7 +13,7 @@ from ...engine.identification import identify as fit_to_runs
 from ...engine.parameters import DAMPER_NAMES, PARAMETER_NAMES, parameter
 from ...engine.problem import Problem
 from ...engine.vehicle import Vehicle
-from .arguments import bounds, rims_settings, starts
+from .arguments import bounds, loss, priors, rims_settings, starts, whole
 from .inputs import find_vehicle, read_noise, read_runs, recording_files
 from .output import (
     print_fit_percent,
@@ -49,9 +49,16 @@ def fitted(options: Namespace, vehicle: Vehicle, runs: Sequence[Run]) -> Fit:
         start=starts(options.start),
         traction=options.traction or "exact",
         settings=rims_settings(options),
+        loss=loss(options),
+        priors=priors(options.prior),
     )
     watched = sys.stderr.isatty()
-    fit = fit_to_runs(problem, progress=_show if watched else None)
+    fit = fit_to_runs(
+        problem,
+        progress=_show if watched else None,
+        starts=whole(options.starts or "1", f"--starts {options.starts}", "how many starts"),
+        seed=options.seed or 0,
+    )
     if watched:
         print("\r\033[K", end="", file=sys.stderr)
     return fit
@@ -69,6 +76,8 @@ def _free(options: Namespace) -> list[str] | None:
 def _show(progress: Progress) -> None:
     """Keep one line on the terminal up to date."""
     line = f"{progress.simulations} simulations, cost {progress.cost:.6g}"
+    if progress.searches > 1:
+        line += f", search {progress.search} of {progress.searches}"
     print(f"\r{line}\033[K", end="", file=sys.stderr, flush=True)
 
 
@@ -91,7 +100,27 @@ def print_fit(fit: Fit) -> None:
     print()
     print_fit_percent(fit.fit_percent)
     print()
+    if fit.starts > 1:
+        _print_minima(fit)
     print(f"{fit.outcome} {fit.simulations} simulations in {fit.seconds:.1f} s.")
     for sentence in fit.verdict.sentences:
         print(sentence)
     print_warnings(fit.warnings)
+
+
+def _print_minima(fit: Fit) -> None:
+    """Print what the searches from many starts ended in."""
+    rows = [("minimum", "cost", "searches", "cut short", "at a bound", "ended")]
+    rows += [
+        (
+            f"{place}{' (start)' if one.from_start else ''}",
+            significant(one.cost, 6),
+            str(one.starts),
+            str(one.cut_short),
+            ", ".join(one.at_bound) or "none",
+            str(one.outcome),
+        )
+        for place, one in enumerate(fit.minima, start=1)
+    ]
+    print_table(rows, right=(1, 2, 3))
+    print()

@@ -289,6 +289,44 @@ def test_identified_car_and_report(folder, driven, capsys):
     assert main(["simulate", "--vehicle", "fit.json", "--rims", str(driven)]) == 0
 
 
+def test_starts_loss_and_priors_are_asked_for_printed_and_kept(folder, driven, capsys):
+    """Oracle: the car that drove, and a prior far narrower than what the noise-free run tells."""
+    command = ["identify", str(driven), "--vehicle", "paper", "-o", "fit.json"]
+    command += ["--free", "K_F", "K_R", "--start", "K_F=40000", "--starts", "4", "--seed", "7"]
+    command += ["--loss", "huber", "--loss-scale", "2.5", "--prior", "K_R=30000~1e-6%"]
+    assert main(command) == 0
+    printed = capsys.readouterr().out
+    assert "minimum" in printed
+    assert "The search converged." in printed
+    fit = json.loads((folder / "fit.json").read_text())
+    assert (fit["starts"], fit["loss"], fit["loss_scale"]) == (4, "huber", 2.5)
+    assert sum(one["starts"] for one in fit["minima"]) == 4
+    assert fit["minima"][0]["cost"] == fit["cost"]
+    assert fit["priors"][0]["deviation"] == pytest.approx(3e-4)
+    assert fit["parameters"][1]["value"] == pytest.approx(30000.0, rel=1e-6)
+    assert "standard errors from its prior" in " ".join(fit["warnings"])
+
+
+@pytest.mark.parametrize(
+    ("option", "sentence"),
+    [
+        ("--starts 0", "starts is 0; give a number from 1 to 1024"),
+        ("--starts 1.5", "is not a whole number"),
+        ("--loss hubert", "invalid choice: 'hubert'"),
+        ("--loss-scale 2", "needs a loss that bends"),
+        ("--loss huber --loss-scale 0", "loss_scale is 0.0; give 0.01 to 1e+06 noises"),
+        ("--prior K_F=24000", "lacks a standard deviation; write NAME=VALUE~DEVIATION"),
+        ("--prior K_F=24000~x", "'x' is not a finite number"),
+        ("--prior K_Q=24000~1", "did you mean K_R?"),
+        ("--prior C_F=1700~5%", "front.suspension.damping, which is not free"),
+        ("--prior K_F=24000~5% K_F=1~1", "a second time"),
+    ],
+)
+def test_what_a_search_cannot_be_asked_is_refused(driven, capsys, option, sentence):
+    command = ["identify", str(driven), "--vehicle", "paper", "--free", "K_F", *option.split()]
+    assert sentence in refused(capsys, *command)
+
+
 def test_how_a_recording_is_prepared_is_the_caller_s_and_is_kept(folder, driven):
     """Several runs need a name with each mark; "none" is a mark too."""
     run = read_run(driven)

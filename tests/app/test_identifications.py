@@ -85,6 +85,11 @@ def test_what_a_job_shows_repeats_its_fit(engineer):
         "traction": "paper",
         "settings": {"rim_cutoff_hz": None, "initial_state": "measured", "step": 0.004},
         "braking": {run: []},
+        "starts": 3,
+        "seed": 5,
+        "loss": "cauchy",
+        "loss_scale": 5.0,
+        "priors": {"phi_F": [0.07, 0.05]},
     }
     first = engineer.post("/identifications", json=asked).json()["id"]
     first = engineer.wait_for("identifications", first)
@@ -102,6 +107,22 @@ def test_what_a_job_shows_repeats_its_fit(engineer):
     differ = {name for name in first["result"] if first["result"][name] != again["result"][name]}
     assert differ <= {"seconds"}
     assert first["free"] == again["free"] == [REAR, "front.pivot.angle"]
+    assert first["priors"] == {"front.pivot.angle": [0.07, 0.05]}
+    assert first["progress"]["searches"] == first["result"]["starts"] == 3
+    assert sum(one["starts"] for one in first["result"]["minima"]) == 3
+
+
+def test_what_a_search_cannot_be_asked_is_refused(engineer):
+    run = engineer.get("/measurements").json()[0]["id"]
+    for asked, sentence in (
+        ({"starts": 2000}, "less than or equal to 1024"),
+        ({"loss": "hubert"}, "'linear', 'soft_l1', 'huber'"),
+        ({"loss_scale": 0}, "greater than or equal to 0.01"),
+        ({"priors": {"K_R": [1e3, 1.0]}}, "lies outside its bounds"),
+        ({"priors": {"K_Q": [1e3, 1.0]}}, "did you mean"),
+    ):
+        refused = engineer.post("/identifications", json={"runs": [run], **asked})
+        assert (refused.status_code, sentence in refused.text) == (422, True), refused.text
 
 
 def test_a_start_too_stiff_for_the_step_is_refused_with_one_that_it_takes(engineer):

@@ -8,10 +8,11 @@ import pytest
 from numpy.testing import assert_allclose
 from ridetune.engine.errors import ProblemError
 from ridetune.engine.identification import Problem, identify
-from ridetune.engine.loss import Loss, LossName
+from ridetune.engine.loss import Loss
 from ridetune.engine.parameters import PARAMETER_NAMES
 from ridetune.engine.problem import DEFAULT_NOISE
 from ridetune.engine.residuals import Residuals
+from ridetune.engine.search_settings import LossName
 from scipy.optimize import least_squares
 
 from .. import stand_in
@@ -23,7 +24,7 @@ START = {name: 1.2 * CAR.value(name) for name in FREE}
 
 
 def spiked(share=0.01, size=20.0, samples=1001):
-    """The reference's recording with spikes on z, on the side on which the front spring moves it."""
+    """The reference's recording with spikes on z, where the front spring moves it to."""
     run = stand_in.recording(CAR, seed=5, samples=samples)
     rng = np.random.default_rng(1)
     hit = rng.choice(run.time.size, int(share * run.time.size), replace=False)

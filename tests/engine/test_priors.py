@@ -34,7 +34,7 @@ def without(problem):
 def test_runs_and_priors_combine_as_gaussians():
     """Oracle: precisions add, and means weighted by them; a prior in the logarithm has the
     deviation over the mean. The combination has the errors of both, by their shares; the runs'
-    are as in a fit to them alone, but for residuals that the priors move by a tenth of a standard error."""
+    are as in a fit to them alone, as the priors move residuals by a tenth of a standard error."""
     relative = DATA_ERROR[1].std_error / DATA_ERROR[1].value
     mean = (1.0 + 0.2 * relative) * DATA_ERROR[1].value
     deviation = 0.7 * relative * mean
