@@ -156,6 +156,23 @@ class PriorCheck:
 
 
 @dataclass(frozen=True, slots=True)
+class Whiteness:
+    """How far one channel's residuals are from white noise (`whiteness`).
+
+    statistic : greatest distance of the cumulative periodogram from that of white noise, 0 to 1
+    p : probability of such a distance or a greater one, were they white
+    effective_samples : independent samples that they are worth, of `samples`
+    """
+
+    run: str
+    channel: str
+    statistic: float
+    p: float
+    effective_samples: float
+    samples: int
+
+
+@dataclass(frozen=True, slots=True)
 class FittedRun:
     """What was compared in one run, SI.
 
@@ -244,6 +261,7 @@ class Fit:
     minima: tuple[Minimum, ...]
     loss: Loss
     priors: tuple[PriorCheck, ...]
+    whiteness: tuple[Whiteness, ...]
     verdict: Verdict
 
 

@@ -46,6 +46,7 @@ def fit_to_json(fit: Fit) -> dict[str, Any]:
             "loss": fit.loss.name,
             "loss_scale": fit.loss.scale,
             "priors": [asdict(one) for one in fit.priors],
+            "whiteness": [asdict(one) for one in fit.whiteness],
             "starts": fit.starts,
             "minima": [asdict(one) for one in fit.minima],
             "seconds": fit.seconds,

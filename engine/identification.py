@@ -49,6 +49,7 @@ from .search_settings import MOST_STARTS
 from .simulation import rims_batch
 from .uncertainty import Uncertainty, information, uncertainty
 from .verdict import verdict, without_verdict
+from .whiteness import whiteness, whiteness_findings
 
 __all__ = ["Fit", "FreeParameter", "Outcome", "Problem", "Progress", "identify"]
 
@@ -116,7 +117,13 @@ def identify(
     reached = refined_starts(search, x_start, others, most_evaluations)
     solution = reached[0][0]
     r = solution.residuals
-    said = information(residuals.of_runs(r, solution.slopes))
+    left = residuals.of_runs(r, solution.slopes)
+    said = information(left)
+    tests = tuple(
+        test
+        for seen, run in zip(problem.runs, left, strict=True)
+        for test in whiteness(seen.name, list(seen.measured), run, problem.settings)
+    )
     errors = uncertainty(sum(residuals.of_priors(), start=said))
     priors = prior_checks(residuals, solution, said)
     estimates = _estimates(problem, solution.x, errors, beyond=solution.beyond())
@@ -143,6 +150,7 @@ def identify(
             *minima_findings(minima),
             *outlier_findings(problem, runs),
             *disagreements(priors, problem.free),
+            *whiteness_findings(tests),
             *bound_findings(estimates),
         ]
     if converged:
@@ -171,6 +179,7 @@ def identify(
         minima=minima,
         loss=problem.loss,
         priors=priors,
+        whiteness=tests,
     )
 
 

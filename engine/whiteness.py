@@ -1,0 +1,81 @@
+"""Whether residuals are white: noise, or something that the model misses.
+
+Bartlett's test of the cumulative periodogram (Bartlett, An Introduction to Stochastic Processes,
+1955, 9.22; Durbin, Biometrika 56, 1969). With the periodogram I_j at the frequencies j = 1 ... q
+below half the sampling rate,
+
+    D = max |sum_{i <= j} I_i / sum_{i <= q} I_i - j / q|,
+
+and for white noise sqrt(q - 1) D follows Kolmogorov's distribution. It looks at all time scales at
+once and takes no number of lags. Where the outputs are filtered, only frequencies that the filter
+leaves alone count.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import kstwobign
+
+from .fit import Whiteness
+from .rims_settings import RimsSettings
+from .uncertainty import RunResiduals, bandwidth, effective_samples
+
+Array = NDArray[np.float64]
+
+UNTOUCHED = 0.5
+"""Share of a low-pass's cutoff up to which it takes less than 2 % off the amplitude."""
+
+FEWEST_FREQUENCIES = 10
+DOUBTFUL = 1e-6
+"""Probability of such residuals, were they white, below which ..."""
+
+FEW_EFFECTIVE = 0.5
+"""... and share of effective samples below which something is said."""
+
+
+def whiteness(
+    name: str, channels: list[str], run: RunResiduals, settings: RimsSettings
+) -> list[Whiteness]:
+    """One test a channel of a run; none where there are too few frequencies to tell."""
+    width = bandwidth(run.residuals, run.step)
+    found = []
+    for channel, residuals in zip(channels, run.residuals, strict=True):
+        periodogram = np.abs(np.fft.rfft(residuals)[1 : (len(residuals) + 1) // 2]) ** 2
+        if settings.output_cutoff_hz is not None:
+            seen = int(UNTOUCHED * settings.output_cutoff_hz * run.step * len(residuals))
+            periodogram = periodogram[:seen]
+        q, power = len(periodogram), float(np.sum(periodogram))
+        if q < FEWEST_FREQUENCIES or power == 0.0:
+            continue
+        share = np.cumsum(periodogram) / power
+        statistic = float(np.max(np.abs(share - np.arange(1, q + 1) / q)))
+        found.append(
+            Whiteness(
+                run=name,
+                channel=channel,
+                statistic=statistic,
+                p=float(kstwobign.sf(np.sqrt(q - 1) * statistic)),
+                effective_samples=min(effective_samples(residuals, width), len(residuals)),
+                samples=len(residuals),
+            )
+        )
+    return found
+
+
+def whiteness_findings(tests: tuple[Whiteness, ...]) -> list[str]:
+    """A sentence where residuals are far from white."""
+    coloured = [
+        one
+        for one in tests
+        if one.p < DOUBTFUL and one.effective_samples < FEW_EFFECTIVE * one.samples
+    ]
+    if not coloured:
+        return []
+    where: dict[str, list[str]] = {}
+    for one in coloured:
+        where.setdefault(one.run, []).append(one.channel)
+    named = "; ".join(f"{', '.join(channels)} of run {run}" for run, channels in where.items())
+    effective = sum(one.effective_samples for one in tests)
+    return [
+        f"The residuals are not noise in {named}: the model misses something there, and the error "
+        f"bars count {effective:.0f} of {sum(one.samples for one in tests)} samples."
+    ]
