@@ -336,6 +336,7 @@ def _add_vehicle(command: Parser) -> None:
 
 def _add_rims_mode(command: Parser, example: str) -> None:
     """How the recordings drive the model; see engine.rims_settings for what holds untold."""
+    compared = "z, pitch and roll, recorded and simulated; none unless told"
     command.add_argument("--traction", choices=("exact", "paper"), help="exact unless told")
     command.add_argument(
         "--initial-state",
@@ -343,11 +344,12 @@ def _add_rims_mode(command: Parser, example: str) -> None:
         help="of the body; equilibrium unless told",
     )
     for option, what in (
-        ("--a-x-cutoff", "a_x, 20 unless told"),
-        ("--rim-cutoff", "the wheels, 50 unless told"),
-        ("--output-cutoff", "z, pitch and roll, recorded and simulated; none unless told"),
+        ("--a-x-cutoff", "low-pass of a_x, 20 unless told"),
+        ("--rim-cutoff", "low-pass of the wheels, 50 unless told"),
+        ("--output-cutoff", f"low-pass of {compared}"),
+        ("--output-highpass", f"high-pass of {compared}"),
     ):
-        command.add_argument(option, metavar="HZ|none", help=f"low-pass of {what}")
+        command.add_argument(option, metavar="HZ|none", help=what)
     command.add_argument(
         "--braking",
         metavar="BEGIN:END",

@@ -21,7 +21,13 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from ..engine import rims_settings
-from ..engine.rims_settings import LOWEST_CUTOFF, InitialState, RimsSettings
+from ..engine.rims_settings import (
+    HIGHEST_HIGHPASS,
+    LOWEST_CUTOFF,
+    LOWEST_HIGHPASS,
+    InitialState,
+    RimsSettings,
+)
 from ..engine.search_settings import (
     DEFAULT_SCALE,
     LARGEST_SCALE,
@@ -40,6 +46,7 @@ Name = Annotated[str, StringConstraints(min_length=1, max_length=100)]
 Names = Annotated[list[Name], Field(max_length=200)]
 Traction = Literal["exact", "paper"]
 Cutoff = Annotated[Number, Field(ge=LOWEST_CUTOFF)] | None
+Highpass = Annotated[Number, Field(ge=LOWEST_HIGHPASS, le=HIGHEST_HIGHPASS)] | None
 RimsStep = Annotated[Number, Field(ge=rims_settings.SHORTEST_STEP, le=rims_settings.LONGEST_STEP)]
 Intervals = Annotated[list[tuple[Number, Number]], Field(max_length=100)]
 RIMS = RimsSettings()
@@ -76,6 +83,7 @@ class RimsSettingsForm(WireForm):
     a_x_cutoff_hz: Cutoff = RIMS.a_x_cutoff_hz
     rim_cutoff_hz: Cutoff = RIMS.rim_cutoff_hz
     output_cutoff_hz: Cutoff = RIMS.output_cutoff_hz
+    output_highpass_hz: Highpass = RIMS.output_highpass_hz
     initial_state: InitialState = RIMS.initial_state
     step: RimsStep = RIMS.step
 

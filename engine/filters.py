@@ -1,4 +1,4 @@
-"""Zero-phase low-pass of a recorded channel, for any sampling.
+"""Zero-phase low-pass and high-pass of a recorded channel, for any sampling.
 
 A Butterworth low-pass in second-order sections runs forwards and backwards over the record
 (`scipy.signal.sosfiltfilt`), so the phase is zero and the amplitude at frequency f is
@@ -12,6 +12,9 @@ samples, filtered there, and carried back.
 ORDER is a compromise between two errors of a low acceleration record whose content reaches wheel
 hop (12 Hz) under a 20 Hz cutoff: a low order takes off amplitude at hop, a high one rings longer
 at jumps. docs/identification.md has the figures.
+
+The high-pass is what the low-pass takes away, |H|^2 = (f / f_c)^(2 n) / (1 + (f / f_c)^(2 n)). It
+takes off any straight line, and what drifts as time to a power up to 2 n - 1.
 """
 
 import math
@@ -23,6 +26,8 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
 Array = NDArray[np.float64]
+Band = tuple[float | None, float | None]
+"""Lowest and highest frequency, Hz."""
 
 ORDER = 3
 """Order of the Butterworth filter in each of the two passes."""
@@ -62,6 +67,23 @@ def smoothed(time: Array, values: Array, cutoff: float | None) -> Array:
     if cutoff is None or too_coarse(float(time[-1] - time[0]) / (len(time) - 1), cutoff):
         return values
     return low_pass(time, values, cutoff)
+
+
+def high_pass(time: Array, values: Array, cutoff: float) -> Array:
+    """The record without its content below `cutoff`, Hz; arguments as of `low_pass`."""
+    return values - low_pass(time, values, cutoff)
+
+
+def resolved(time: Array, cutoff: float) -> bool:
+    """Whether a record is long enough to tell what lies below `cutoff`, Hz, from what does not."""
+    return (time[-1] - time[0]) * cutoff >= PAD_PERIODS
+
+
+def in_band(time: Array, values: Array, band: Band) -> Array:
+    """The record between two frequencies, Hz, either of which may be None for no end."""
+    low, high = band
+    values = smoothed(time, values, high)
+    return values if low is None else high_pass(time, values, low)
 
 
 def _low_pass_uniform(time: Array, values: Array, cutoff: float) -> Array:

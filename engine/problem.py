@@ -245,7 +245,7 @@ def _compared_runs(
     found = []
     for name, run in zip(names, runs, strict=True):
         chosen = outputs.get(name) if isinstance(outputs, Mapping) else outputs
-        measured = filtered_outputs(run, settings.output_cutoff_hz)
+        measured = filtered_outputs(run, settings.output_band)
         if not measured:
             raise ProblemError(
                 f"Run {name} has none of {', '.join(OUTPUT_CHANNELS)}; at least one is needed."

@@ -25,7 +25,7 @@ from scipy.interpolate import CubicSpline, PPoly
 from .braking import slow_acceleration
 from .channels import INPUT_CHANNELS, WHEEL_CHANNELS, Run
 from .errors import MeasurementError
-from .filters import is_uniform, smoothed, too_coarse
+from .filters import PAD_PERIODS, is_uniform, resolved, smoothed, too_coarse
 from .initial_state import measured_state
 from .recording_checks import Finding, check_recording, stands
 from .rims_settings import RimsSettings
@@ -84,7 +84,7 @@ def recorded_motion(run: Run, settings: RimsSettings) -> RecordedMotion:
 
     Raises MeasurementError when a channel is missing or the run is too short.
     """
-    _require(run)
+    _require(run, settings)
     time = run.time
     nodes = _node_times(time, settings.step)
     stages = np.linspace(nodes[0], nodes[-1], 2 * len(nodes) - 1)
@@ -121,7 +121,7 @@ def recorded_motion(run: Run, settings: RimsSettings) -> RecordedMotion:
     )
 
 
-def _require(run: Run) -> None:
+def _require(run: Run, settings: RimsSettings) -> None:
     missing = [name for name in INPUT_CHANNELS if name not in run]
     if missing:
         raise MeasurementError(
@@ -138,6 +138,12 @@ def _require(run: Run) -> None:
         raise MeasurementError(
             f"Run {run.name} has {len(run.time)} samples over {lasts:.3g} s; at least "
             f"{FEWEST_SAMPLES} samples over {SHORTEST} s are needed."
+        )
+    low = settings.output_highpass_hz
+    if low is not None and not resolved(run.time, low):
+        raise MeasurementError(
+            f"Run {run.name} lasts {lasts:.3g} s, too short for an output_highpass_hz of {low:g}: "
+            f"that takes {PAD_PERIODS / low:.3g} s; raise it, or leave it out."
         )
     steps = np.diff(run.time)
     if np.median(steps) > COARSEST:

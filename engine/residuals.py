@@ -29,7 +29,7 @@ from .car_rows import car_row
 from .channels import OUTPUT_CHANNELS
 from .condensed import triangle
 from .errors import Cancelled
-from .filters import smoothed
+from .filters import in_band
 from .kernels.lanes import BATCH
 from .problem import Problem
 from .rims import RimsInputs
@@ -310,11 +310,11 @@ class Residuals:
 
     def _filtered(self, time: Array, histories: Array) -> Array:
         """Histories (cars, samples, 3) through the output filter; a failed car stays as it is."""
-        cutoff = self.problem.settings.output_cutoff_hz
-        if cutoff is None:
+        band = self.problem.settings.output_band
+        if band == (None, None):
             return histories
         columns = np.nan_to_num(histories).transpose(1, 0, 2).reshape(len(time), -1)
-        filtered = smoothed(time, columns, cutoff).reshape(len(time), len(histories), -1)
+        filtered = in_band(time, columns, band).reshape(len(time), len(histories), -1)
         return np.where(np.isfinite(histories), filtered.transpose(1, 0, 2), np.nan)
 
     def _stop_if_cancelled(self) -> None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .braking import Interval, braking_of, braking_weight
 from .channels import OUTPUT_CHANNELS, Run
 from .demand import rolling_resistance
-from .filters import smoothed
+from .filters import Band, in_band
 from .recorded_motion import RecordedMotion, recorded_motion
 from .recording_checks import check_on_car
 from .rims_settings import RimsSettings
@@ -134,6 +134,6 @@ def _braked(motion: RecordedMotion, intervals: list[Interval]) -> Array:
     return braked
 
 
-def filtered_outputs(run: Run, cutoff: float | None) -> dict[str, Array]:
-    """The run's z, pitch and roll, those there are, through the output filter."""
-    return {name: smoothed(run.time, run[name], cutoff) for name in OUTPUT_CHANNELS if name in run}
+def filtered_outputs(run: Run, band: Band) -> dict[str, Array]:
+    """The run's z, pitch and roll, those there are, between the frequencies of `band`."""
+    return {name: in_band(run.time, run[name], band) for name in OUTPUT_CHANNELS if name in run}

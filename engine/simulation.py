@@ -17,7 +17,7 @@ from .car_rows import car_row
 from .channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
 from .demand import Demand, PiecewiseLinear, PostMotion
 from .errors import SimulationDiverged, SimulationError
-from .filters import smoothed
+from .filters import in_band, smoothed
 from .frames import AXLES, CORNERS
 from .initial_state import swings_in
 from .integration import check_sound, free_outputs, free_states, rims_outputs, rims_states
@@ -379,8 +379,8 @@ def _fit_percent(simulated: Run, measured: Run, settings: RimsSettings) -> dict[
     scores = {}
     for name in measured.columns:
         if name in simulated and name not in given:
-            cutoff = settings.output_cutoff_hz if name in OUTPUT_CHANNELS else None
-            histories = (smoothed(run.time, run[name], cutoff) for run in (measured, simulated))
+            band = settings.output_band if name in OUTPUT_CHANNELS else (None, None)
+            histories = (in_band(run.time, run[name], band) for run in (measured, simulated))
             scores[name] = fit_percent(*histories)
     return scores
 
@@ -391,8 +391,8 @@ def _swing(
     """A sentence where the record starts away from the equilibrium in which the model starts."""
     if inputs.stands:
         return []
-    name, time, cutoff = measured.name, measured.time, settings.output_cutoff_hz
-    recorded, followed = (filtered_outputs(run, cutoff) for run in (measured, simulated))
+    name, time, band = measured.name, measured.time, settings.output_band
+    recorded, followed = (filtered_outputs(run, band) for run in (measured, simulated))
     if model == "7dof":
         remedy = "begin the run at rest, as the 7-DOF model does"
         return swings_in(name, time, recorded, followed, remedy=remedy)

@@ -312,7 +312,7 @@ def _squat(window: SquatWindow, run: Run) -> float:
 
 def _filtered(run: Run, settings: RimsSettings) -> Run:
     """The run with its outputs through the output filter."""
-    outputs = filtered_outputs(run, settings.output_cutoff_hz)
+    outputs = filtered_outputs(run, settings.output_band)
     return replace(run, channels={**run.channels, **outputs})
 
 

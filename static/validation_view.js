@@ -24,7 +24,8 @@ const ROAD_COLOURS = ["#0072b2", "#d55e00"];
 /** How recordings were prepared, as the set-up of an identification calls it. */
 const SETTINGS = {
   a_x_cutoff_hz: "Low-pass of aₓ, Hz", rim_cutoff_hz: "Low-pass of wheels, Hz",
-  output_cutoff_hz: "Low-pass of z, pitch, roll, Hz", initial_state: "Initial state",
+  output_cutoff_hz: "Low-pass of z, pitch, roll, Hz",
+  output_highpass_hz: "High-pass of z, pitch, roll, Hz", initial_state: "Initial state",
   step: "Longest step, s",
 };
 const WELL = { yes: "well", weakly: "weakly", no: "not" };

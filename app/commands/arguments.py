@@ -122,7 +122,7 @@ def whole(text: str, argument: str, form: str) -> int:
 def rims_settings(options: Namespace) -> RimsSettings:
     """How the recordings are prepared, as far as the options tell."""
     told: dict[str, Any] = {}
-    for field in ("a_x_cutoff", "rim_cutoff", "output_cutoff"):
+    for field in ("a_x_cutoff", "rim_cutoff", "output_cutoff", "output_highpass"):
         text = getattr(options, field)
         if text is not None:
             argument = f"--{field.replace('_', '-')} {text}"

@@ -22,7 +22,7 @@ BELONGS_TO = {
     **dict.fromkeys(
         (
             *("traction", "initial_state", "braking"),
-            *("a_x_cutoff", "rim_cutoff", "output_cutoff"),
+            *("a_x_cutoff", "rim_cutoff", "output_cutoff", "output_highpass"),
         ),
         "--rims",
     ),

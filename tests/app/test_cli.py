@@ -339,6 +339,7 @@ def test_how_a_recording_is_prepared_is_the_caller_s_and_is_kept(folder, driven)
     assert main([*command, "--braking", *marks, "-o", "fit.json"]) == 0
     fit = json.loads((folder / "fit.json").read_text())
     settings = {"a_x_cutoff_hz": None, "rim_cutoff_hz": 30.0, "output_cutoff_hz": None}
+    settings |= {"output_highpass_hz": None}
     settings |= {"initial_state": "measured", "step": 0.004}
     assert fit["settings"] == settings
     assert [run["braking"] for run in fit["runs"]] == [[], [[2.5, 3.0], [1.0, 2.0]]]

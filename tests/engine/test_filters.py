@@ -1,6 +1,14 @@
 import numpy as np
 from numpy.testing import assert_allclose
-from ridetune.engine.filters import ORDER, is_uniform, low_pass, smoothed, too_coarse
+from ridetune.engine.filters import (
+    ORDER,
+    high_pass,
+    in_band,
+    is_uniform,
+    low_pass,
+    smoothed,
+    too_coarse,
+)
 
 CUTOFF, STEP = 20.0, 0.005
 
@@ -61,3 +69,25 @@ def test_a_record_too_coarse_for_the_cutoff_is_left_as_it_is():
     assert not too_coarse(STEP, CUTOFF)
     assert_allclose(smoothed(time, values, CUTOFF), values, rtol=0, atol=0)
     assert_allclose(smoothed(time, values, None), values, rtol=0, atol=0)
+
+
+def test_the_high_pass_leaves_what_the_low_pass_takes():
+    """Oracle: 1 - |H|^2 of the low-pass is |H|^2 of the Butterworth high-pass; a parabola t^2 is
+    gone, as the filter's gain rises with the sixth power of the frequency.
+
+    The middle of 100 periods is 50 periods from ends that are no parabola's: exp(-9.4) of three
+    periods is 1e-65 of fifty, so that rounding (1e-16 of 1e4) is all that is left.
+    """
+    time = np.arange(0.0, 100.0, 0.01)
+    sine = np.sin(2 * np.pi * 2.0 * time)
+    filtered = high_pass(time, sine + (time - 50.0) ** 2 + 7.0 * time, 1.0)
+    ratio = np.tan(np.pi * 2.0 * 0.01) / np.tan(np.pi * 1.0 * 0.01)
+    inner = slice(3000, -3000)
+    kept = ratio ** (2 * ORDER) / (1.0 + ratio ** (2 * ORDER))
+    assert_allclose(filtered[inner], kept * sine[inner], rtol=0, atol=1e-8)
+
+
+def test_a_band_without_ends_is_everything():
+    time = np.arange(0.0, 2.0, STEP)
+    values = np.sin(30.0 * time)
+    assert in_band(time, values, (None, None)) is values

@@ -133,6 +133,19 @@ def test_the_output_filter_is_applied_to_model_and_measurement_alike():
     assert_allclose(found, low_pass(run.time, expected.T, 5.0).T, rtol=0, atol=1e-9)
 
 
+def test_the_output_high_pass_is_applied_to_model_and_measurement_alike():
+    """Oracle: as of the low-pass; the two together leave the band between them."""
+    run = stand_in.recording(CAR)
+    plain = problem([run])
+    band = problem([run], settings=RimsSettings(output_cutoff_hz=5.0, output_highpass_hz=1.0))
+    x = start_of(plain)
+    expected = Residuals(plain, stand_in.simulate).vector(x).reshape(3, -1).T
+    expected = low_pass(run.time, expected, 5.0)
+    expected -= low_pass(run.time, expected, 1.0)
+    found = Residuals(band, stand_in.simulate).vector(x).reshape(3, -1)
+    assert_allclose(found, expected.T, rtol=0, atol=1e-9)
+
+
 def test_cancel_is_seen_while_a_simulation_is_under_way():
     """The simulation ends only after Cancelled is raised, so a cancel cannot have waited for it."""
     asked = problem([stand_in.recording(CAR)])

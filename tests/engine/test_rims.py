@@ -161,6 +161,13 @@ def test_a_run_too_short_for_the_filter_is_refused():
         prepare(still_run(np.linspace(0.0, 1.0, 5)), CAR)
 
 
+def test_a_run_too_short_for_the_high_pass_is_refused():
+    """Three periods of 0.2 Hz are 15 s."""
+    run = still_run(np.arange(0.0, 14.9, 0.01))
+    with pytest.raises(MeasurementError, match=r"lasts 14\.9 s, too short .* that takes 15 s"):
+        recorded_motion(run, RimsSettings(output_highpass_hz=0.2))
+
+
 def test_gaps_in_an_input_are_refused():
     time = np.linspace(0.0, 2.0, 401)
     broken = np.where(time > 1.0, np.nan, 0.0)
