@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from .errors import MeasurementError
 from .frames import AXLES, CORNERS
+from .step_record import StepRecord
 
 _MILLI = ("mm", 1e3)
 _DEGREE = ("deg", 180.0 / math.pi)
@@ -86,6 +87,38 @@ CHANNEL_KINDS: tuple[ChannelInfo, ...] = (
         "forward, inertial",
         largest=20.0,
     ),
+    _row(
+        "chassis.a_z",
+        "m/s^2",
+        "acceleration",
+        "Chassis vertical acceleration",
+        "of the CG, up, inertial",
+        largest=50.0,
+    ),
+    _row(
+        "chassis.body_a_x",
+        "m/s^2",
+        "acceleration",
+        "Body-fixed accelerometer, along",
+        "forward in the body's axes, gravity included",
+        largest=50.0,
+    ),
+    _row(
+        "chassis.body_a_y",
+        "m/s^2",
+        "acceleration",
+        "Body-fixed accelerometer, across",
+        "left in the body's axes, gravity included",
+        largest=50.0,
+    ),
+    _row(
+        "chassis.body_a_z",
+        "m/s^2",
+        "acceleration",
+        "Body-fixed accelerometer, vertical",
+        "up in the body's axes, gravity included: 9.81 at rest",
+        largest=60.0,
+    ),
     _row("chassis.v_x", "m/s", "speed", "Speed", "forward", ("km/h", 3.6), largest=120.0),
     _row("chassis.x", "m", "distance", "Distance travelled", "forward"),
     _row(
@@ -97,6 +130,23 @@ CHANNEL_KINDS: tuple[ChannelInfo, ...] = (
         _MILLI,
         largest=0.5,
         smallest=1e-4,
+    ),
+    _row(
+        "wheel.{corner}.a_z",
+        "m/s^2",
+        "acceleration",
+        "{corner} hub accelerometer, vertical",
+        "up in the wheel carrier's axes, gravity included: 9.81 at rest",
+        largest=1000.0,
+    ),
+    _row(
+        "wheel.{corner}.speed",
+        "m/s",
+        "speed",
+        "{corner} wheel speed",
+        "forward, of the tread",
+        ("km/h", 3.6),
+        largest=120.0,
     ),
     _row(
         "tyre.{corner}.load", "N", "force", "{corner} tyre load", "compression", _KILO, largest=1e5
@@ -309,6 +359,7 @@ class Run:
     noise : name -> standard deviation of the measurement noise in SI, where it is known
     warnings : sentences about what is doubtful in the recording
     braking : (begin, end) in s where the car brakes; None to look for it in a_x
+    conditioning : what made these channels of those that were recorded, step by step
     """
 
     name: str
@@ -318,6 +369,7 @@ class Run:
     warnings: tuple[str, ...] = ()
     description: str = ""
     braking: tuple[tuple[float, float], ...] | None = None
+    conditioning: tuple[StepRecord, ...] = ()
 
     def __post_init__(self) -> None:
         """Check the shapes and bring the channels into the table's order."""

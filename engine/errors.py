@@ -29,6 +29,12 @@ class MeasurementError(RideError):
     code = "measurement"
 
 
+class ConditioningError(RideError):
+    """A step of conditioning cannot be done to a recording as asked."""
+
+    code = "conditioning"
+
+
 class RoadError(RideError):
     """A road profile or its description cannot be used."""
 

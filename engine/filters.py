@@ -50,15 +50,16 @@ def too_coarse(step: float, cutoff: float) -> bool:
     return cutoff >= 0.45 / step
 
 
-def low_pass(time: Array, values: Array, cutoff: float) -> Array:
+def low_pass(time: Array, values: Array, cutoff: float, *, order: int = ORDER) -> Array:
     """The record `values` (samples,) or (samples, channels) without its content above `cutoff`, Hz.
 
     time : (samples,) strictly increasing, s; the mean step must not be `too_coarse` for the cutoff
+    order : n, of each of the two passes
     """
     if is_uniform(time):
-        return _low_pass_uniform(time, values, cutoff)
+        return _low_pass_uniform(time, values, cutoff, order)
     grid = np.linspace(time[0], time[-1], len(time))
-    filtered = _low_pass_uniform(grid, CubicSpline(time, values)(grid), cutoff)
+    filtered = _low_pass_uniform(grid, CubicSpline(time, values)(grid), cutoff, order)
     return CubicSpline(grid, filtered)(time)
 
 
@@ -74,6 +75,23 @@ def high_pass(time: Array, values: Array, cutoff: float) -> Array:
     return values - low_pass(time, values, cutoff)
 
 
+def slow_part(time: Array, values: Array, cutoff: float) -> Array:
+    """`low_pass` of a record (samples,) whose last sample is mostly noise.
+
+    A straight line is fitted and passes as it is; the rest is continued by even reflection, which,
+    other than the odd one, does not turn about what one sample happens to read.
+    """
+    line = np.polyval(np.polyfit(time - time[0], values, 1), time - time[0])
+    periods = (time[-1] - time[0]) * cutoff
+    pad = min(len(time) - 1, math.ceil(PAD_PERIODS * (len(time) - 1) / periods))
+    rest = values - line
+    after = 2.0 * time[-1] - time[-2 : -pad - 2 : -1]
+    before = 2.0 * time[0] - time[pad:0:-1]
+    longer = np.concatenate([before, time, after])
+    mirrored = np.concatenate([rest[pad:0:-1], rest, rest[-2 : -pad - 2 : -1]])
+    return line + low_pass(longer, mirrored, cutoff)[pad : pad + len(time)]
+
+
 def resolved(time: Array, cutoff: float) -> bool:
     """Whether a record is long enough to tell what lies below `cutoff`, Hz, from what does not."""
     return (time[-1] - time[0]) * cutoff >= PAD_PERIODS
@@ -86,14 +104,14 @@ def in_band(time: Array, values: Array, band: Band) -> Array:
     return values if low is None else high_pass(time, values, low)
 
 
-def _low_pass_uniform(time: Array, values: Array, cutoff: float) -> Array:
+def _low_pass_uniform(time: Array, values: Array, cutoff: float, order: int) -> Array:
     rate = (len(time) - 1) / (time[-1] - time[0])
-    sections = _sections(cutoff, float(rate))
+    sections = _sections(cutoff, float(rate), order)
     pad = min(len(time) - 1, math.ceil(PAD_PERIODS * rate / cutoff))
     return sosfiltfilt(sections, values, axis=0, padtype="odd", padlen=pad)
 
 
 @lru_cache(maxsize=64)
-def _sections(cutoff: float, rate: float) -> Array:
+def _sections(cutoff: float, rate: float, order: int) -> Array:
     """The filter for a cutoff and a sampling rate, Hz; its design takes as long as its use."""
-    return np.asarray(butter(ORDER, cutoff, fs=rate, output="sos"))
+    return np.asarray(butter(order, cutoff, fs=rate, output="sos"))

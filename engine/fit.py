@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from .braking import Interval
 from .loss import Loss
 from .rims_settings import RimsSettings
+from .step_record import StepRecord
 from .uncertainty import Uncertainty
 from .variables import FreeParameter
 from .vehicle import Vehicle
@@ -179,6 +180,7 @@ class FittedRun:
     noise : assumed, by channel
     discounted : samples beyond the scale of the loss, by channel; none where it is linear
     braking : (begin, end) where the car was taken to brake, s
+    conditioning : what made its channels of those that were recorded
     """
 
     name: str
@@ -186,6 +188,7 @@ class FittedRun:
     noise: Mapping[str, float]
     discounted: Mapping[str, int]
     braking: tuple[Interval, ...]
+    conditioning: tuple[StepRecord, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from .fit import Fit, ParameterEstimate
+from .step_record import step_record_to_json
 from .vehicle_file import vehicle_to_json
 
 
@@ -38,6 +39,7 @@ def fit_to_json(fit: Fit) -> dict[str, Any]:
                     "noise": dict(run.noise),
                     "discounted": dict(run.discounted),
                     "braking": [list(interval) for interval in run.braking],
+                    "conditioning": [step_record_to_json(one) for one in run.conditioning],
                 }
                 for run in fit.runs
             ],

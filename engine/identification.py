@@ -308,6 +308,7 @@ def _fitted_run(seen: ComparedRun, residuals: Residuals, r: Array) -> FittedRun:
         noise=dict(seen.noise),
         discounted=discounted,
         braking=seen.inputs.braking,
+        conditioning=seen.inputs.conditioning,
     )
 
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PPoly
 
 from .braking import slow_acceleration
-from .channels import INPUT_CHANNELS, WHEEL_CHANNELS, Run
+from .channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
 from .errors import MeasurementError
 from .filters import PAD_PERIODS, is_uniform, resolved, smoothed, too_coarse
 from .initial_state import measured_state
@@ -117,7 +117,11 @@ def recorded_motion(run: Run, settings: RimsSettings) -> RecordedMotion:
         wheel_rises=wheel_rises(run),
         stands=stands(run),
         findings=tuple(check_recording(run)),
-        doubts=(*_sampling_warnings(run, settings), *unknown_start),
+        doubts=(
+            *_sampling_warnings(run, settings),
+            *_compared_below_band(run, settings),
+            *unknown_start,
+        ),
     )
 
 
@@ -204,4 +208,20 @@ def _sampling_warnings(run: Run, settings: RimsSettings) -> list[str]:
         f"low-pass of {channel}, which is left out."
         for channel, cutoff in filters.items()
         if cutoff is not None and too_coarse(step, cutoff)
+    ]
+
+
+def _compared_below_band(run: Run, settings: RimsSettings) -> list[str]:
+    """A warning where conditioning left nothing of a channel at frequencies that are compared."""
+    made = {name: record for record in run.conditioning for name in record.channels}
+    lows = {
+        name: made[name].band_hz[0] for name in (*WHEEL_CHANNELS, *OUTPUT_CHANNELS) if name in made
+    }
+    banded = {name: low for name, low in lows.items() if low is not None}
+    if not banded or (settings.output_highpass_hz or 0.0) >= max(banded.values()):
+        return []
+    low = max(banded.values())
+    return [
+        f"Run {run.name} has {', '.join(banded)} from {low:g} Hz up alone, and z, pitch and roll "
+        f"are compared below as well; set output_highpass_hz to {2.0 * low:g}, at least to {low:g}."
     ]

@@ -20,6 +20,7 @@ from .filters import Band, in_band
 from .recorded_motion import RecordedMotion, recorded_motion
 from .recording_checks import check_on_car
 from .rims_settings import RimsSettings
+from .step_record import StepRecord
 from .vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -40,6 +41,7 @@ class RimsInputs:
     on_nodes : whether every sample coincides with a node
     braking : (begin, end) where the car is taken to brake, s
     stands : whether it stands at the start
+    conditioning : what made the recording's channels
     warnings : sentences about the recording
     faults : those of them that say that what drives the model is wrong
     """
@@ -54,6 +56,7 @@ class RimsInputs:
     on_nodes: bool
     braking: tuple[Interval, ...] = ()
     stands: bool = False
+    conditioning: tuple[StepRecord, ...] = ()
     warnings: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()
 
@@ -118,6 +121,7 @@ def for_car(motion: RecordedMotion, vehicle: Vehicle) -> RimsInputs:
         on_nodes=bool(np.all(np.minimum(fraction, 1.0 - fraction) < 1e-6)),
         braking=tuple(intervals),
         stands=motion.stands,
+        conditioning=run.conditioning,
         warnings=tuple(dict.fromkeys([*run.warnings, *told, *motion.doubts, *unbraked])),
         faults=(*(finding.sentence for finding in findings if finding.fault), *unbraked),
     )

@@ -23,13 +23,18 @@ def despiked(values: Array) -> Array:
     return median_filter(values, NEIGHBOURS, mode="nearest")
 
 
+def spike_samples(info: ChannelInfo, values: Array) -> NDArray[np.int64]:
+    """Which samples of a channel (samples,) are spikes."""
+    off = np.abs(values - despiked(values))
+    return np.flatnonzero(off > max(SHARE * info.largest, TIMES_USUAL * np.percentile(off, 99)))
+
+
 def spikes(info: ChannelInfo, time: Array, values: Array) -> list[str]:
     """A sentence where a channel (samples,) has spikes."""
-    off = np.abs(values - despiked(values))
-    found = np.flatnonzero(off > max(SHARE * info.largest, TIMES_USUAL * np.percentile(off, 99)))
+    found = spike_samples(info, values)
     if not found.size:
         return []
-    furthest = float(values[found[np.argmax(off[found])]])
+    furthest = float(values[found[np.argmax(np.abs(values - despiked(values))[found])]])
     return [
         f"{info.name} jumps to {info.display_factor * furthest:.4g} {info.display_unit}, as no car "
         f"does, in {found.size} of {values.size} samples from {time[found[0]]:.4g} s on; repair or "

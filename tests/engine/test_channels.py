@@ -14,6 +14,9 @@ chassis.pitch rad
 chassis.roll rad
 chassis.a_x m/s^2
 chassis.v_x m/s
+chassis.a_z chassis.body_a_x chassis.body_a_y chassis.body_a_z m/s^2
+wheel.fl.a_z m/s^2
+wheel.rr.speed m/s
 chassis.x m
 wheel.fl.z wheel.fr.z wheel.rl.z wheel.rr.z m
 tyre.rl.load N

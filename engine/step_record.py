@@ -1,0 +1,83 @@
+"""What a step of conditioning did to a recording, kept with every run and every fit."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from .errors import MeasurementError
+
+
+@dataclass(frozen=True, slots=True)
+class StepRecord:
+    """One step that was done.
+
+    step : the step itself, as JSON data
+    channels : what it wrote
+    numbers : what it found or used, SI, by name
+    band_hz : between which frequencies its channels hold what is true, None for no end
+    sentences : the same for a person
+    """
+
+    step: Mapping[str, Any]
+    channels: tuple[str, ...]
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    band_hz: tuple[float | None, float | None] = (None, None)
+    sentences: tuple[str, ...] = ()
+
+
+def step_record_to_json(record: StepRecord) -> dict[str, Any]:
+    """A record as plain JSON data."""
+    return {
+        "step": dict(record.step),
+        "channels": list(record.channels),
+        "numbers": dict(record.numbers),
+        "band_hz": list(record.band_hz),
+        "sentences": list(record.sentences),
+    }
+
+
+def step_records_from_json(data: Any, source: str) -> tuple[StepRecord, ...]:
+    """Records out of JSON data; `source` heads the message of a MeasurementError."""
+    if not isinstance(data, list) or not all(map(_is_record, data)):
+        raise MeasurementError(
+            f"{source}: conditioning must be a list of what was done, as `ridetune condition` "
+            "writes it; write it anew, or leave it out."
+        )
+    return tuple(
+        StepRecord(
+            dict(one["step"]),
+            tuple(one["channels"]),
+            {name: float(value) for name, value in one["numbers"].items()},
+            (one["band_hz"][0], one["band_hz"][1]),
+            tuple(one["sentences"]),
+        )
+        for one in data
+    )
+
+
+def _is_record(one: Any) -> bool:
+    wanted = {
+        "step": lambda value: isinstance(value, Mapping) and isinstance(value.get("kind"), str),
+        "channels": _texts,
+        "numbers": lambda value: isinstance(value, Mapping) and all(map(_number, value.values())),
+        "band_hz": lambda value: (
+            isinstance(value, list)
+            and len(value) == 2
+            and all(end is None or _number(end) for end in value)
+        ),
+        "sentences": _texts,
+    }
+    return (
+        isinstance(one, Mapping)
+        and one.keys() == wanted.keys()
+        and all(fits(one[name]) for name, fits in wanted.items())
+    )
+
+
+def _texts(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(one, str) for one in value)
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
