@@ -5,13 +5,14 @@ write lock at its start (BEGIN IMMEDIATE), so it waits for its turn instead of f
 """
 
 from contextlib import AbstractContextManager
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from sqlalchemy import Connection, create_engine, event, insert, inspect, select, update
 
 from .errors import StartError
-from .tables import SCHEMA_VERSION, metadata, schema_version
+from .tables import MIGRATIONS, SCHEMA_VERSION, metadata, schema_version
 
 BUSY_MILLISECONDS = 10_000
 
@@ -67,9 +68,10 @@ def _check_schema(connection: Connection, path: Path) -> None:
         metadata.create_all(connection)
         connection.execute(insert(schema_version).values(version=SCHEMA_VERSION))
     version = connection.execute(select(schema_version.c.version)).scalar_one()
-    if version in (1, 2):
+    if 1 <= version < SCHEMA_VERSION:
         metadata.create_all(connection)
-        connection.exec_driver_sql("ALTER TABLE measurements ADD COLUMN manoeuvre TEXT")
+        for statement in chain.from_iterable(MIGRATIONS[version - 1 :]):
+            connection.exec_driver_sql(statement)
         connection.execute(update(schema_version).values(version=SCHEMA_VERSION))
     elif version != SCHEMA_VERSION:
         raise StartError(

@@ -5,7 +5,6 @@ database nor the data directory and may be another machine.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any
 
 from ..engine.channels import Run
@@ -13,7 +12,7 @@ from ..engine.parameters import ALL_NAMES, PARAMETER_NAMES, parameter
 from .errors import OverBudget
 from .job_store import Job
 from .jobs import Kind, digest
-from .recordings import Recordings, with_braking
+from .recordings import Recordings, as_stated, with_braking
 from .schemas import IdentificationRequest
 from .settings import Limits
 from .store import Measurement, Store
@@ -33,8 +32,7 @@ def identification(store: Store, recordings: Recordings) -> Kind:
 
     def payload(job: Job) -> dict[str, Any]:
         kept = [
-            replace(store.measurement(job.session, run["id"]), noise=run["noise"])
-            for run in job.spec["runs"]
+            as_stated(store.measurement(job.session, run["id"]), run) for run in job.spec["runs"]
         ]
         return {**UNTOLD, **job.spec, "runs": marked_runs(job.spec, kept, recordings)}
 

@@ -14,6 +14,7 @@ from fastapi.staticfiles import StaticFiles
 from . import (
     routes_campaigns,
     routes_catalogue,
+    routes_conditioning,
     routes_identifications,
     routes_measurements,
     routes_page,
@@ -83,6 +84,7 @@ def create_app(
         routes_sessions,
         routes_simulations,
         routes_measurements,
+        routes_conditioning,
         routes_identifications,
         routes_sweeps,
         routes_validations,

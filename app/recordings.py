@@ -4,6 +4,7 @@ The original on disk stays the truth; a run here can always be read again from i
 that it prescribes to every car made again.
 """
 
+import json
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -30,9 +31,27 @@ class Recordings:
     def __init__(self, store: Store):
         self._store = store
         self._runs: Remembered[str, Run] = Remembered(REMEMBERED_VALUES)
+        self._conditioned: Remembered[Any, Run] = Remembered(REMEMBERED_VALUES)
         self._motions: Remembered[Any, RecordedMotion] = Remembered(REMEMBERED_VALUES)
 
     def run(self, measurement: Measurement) -> Run:
+        """The recording as it is used: with what is done to it, as `raw` where that is nothing."""
+        if measurement.conditioning is None:
+            return self.raw(measurement)
+        # It brings scipy, which is loaded with the first simulation.
+        from ..engine.conditioning.chain import condition, steps_from_json
+        from ..engine.vehicle_file import vehicle_from_json
+
+        key = _done_to(measurement)
+        run = self._conditioned.get(key)
+        if run is None:
+            asked = measurement.conditioning
+            vehicle = asked["vehicle"] and vehicle_from_json(asked["vehicle"])
+            run = condition(self.raw(measurement), steps_from_json(asked["steps"]), vehicle)
+            self._conditioned.keep(key, run, run.time.size * (1 + len(run.columns)))
+        return run
+
+    def raw(self, measurement: Measurement) -> Run:
         """The parsed recording under the measurement's name, with its noise."""
         run = self._runs.get(measurement.sha256)
         if run is None:
@@ -53,18 +72,45 @@ class Recordings:
     ) -> "RecordedMotion":
         """What the recording prescribes to every car, with its braking marked, if it is marked.
 
-        Noise and marks are no part of the motion, so that it outlives a change of them.
+        Noise and marks are no part of the motion, so that it outlives a change of them, but for
+        noise that conditioning asks for.
         """
         # It brings scipy, which is loaded with the first simulation.
         from ..engine.recorded_motion import recorded_motion
 
         run = with_braking(self.run(measurement), braking)
-        key = measurement.sha256, measurement.name, settings
+        key = _done_to(measurement), settings
         motion = self._motions.get(key)
         if motion is None:
             motion = recorded_motion(run, settings)
             self._motions.keep(key, motion, motion.stage_inputs.size)
         return replace(motion, run=run)
+
+
+def _done_to(measurement: Measurement) -> tuple[Any, ...]:
+    """What stands for a measurement's file and what is done to it."""
+    done = ()
+    if measurement.conditioning is not None:
+        text = json.dumps(measurement.conditioning, sort_keys=True)
+        done = (text, *sorted(measurement.noise.items()))
+    return measurement.sha256, measurement.name, *done
+
+
+def stated(measurement: Measurement) -> dict[str, Any]:
+    """What a job keeps of a measurement, so that it means the same for ever."""
+    return {
+        "id": measurement.id,
+        "name": measurement.name,
+        "noise": measurement.noise,
+        "conditioning": measurement.conditioning,
+    }
+
+
+def as_stated(measurement: Measurement, kept: Mapping[str, Any]) -> Measurement:
+    """The measurement as it was when a job kept that of it."""
+    # Jobs of an earlier service say nothing of conditioning, and its sweeps nothing of noise.
+    noise = kept.get("noise", measurement.noise)
+    return replace(measurement, noise=noise, conditioning=kept.get("conditioning"))
 
 
 def parse(data: bytes, name: str, noise: Mapping[str, float] | None = None) -> Run:

@@ -15,6 +15,7 @@ from .identification_job import (
     marked_runs,
 )
 from .job_routes import View, job_router, submitted
+from .recordings import stated
 from .schemas import IdentificationRequest
 from .services import Services, Shared
 
@@ -23,7 +24,7 @@ ASKED = (
     *("starts", "seed", "loss", "loss_scale", "priors"),
 )
 """Fields of a request that its job shows, with what held untold filled in; of each run its id, its
-name and the noise that was stated of it."""
+name, the noise that was stated of it and what was done to it."""
 
 VIEW = View(
     KIND,
@@ -49,7 +50,7 @@ def _spec(services: Services, sid: str, body: IdentificationRequest) -> dict[str
     vehicle = services.store.session(sid).vehicle if body.vehicle is None else body.vehicle
     spec = body.model_dump(mode="json", exclude={"key", "runs", "vehicle"})
     spec["vehicle"] = vehicle_to_json(vehicle_from_json(vehicle))
-    spec["runs"] = [{"id": one.id, "name": one.name, "noise": one.noise} for one in kept]
+    spec["runs"] = [stated(one) for one in kept]
     if strangers := set(body.braking) - {one.id for one in kept}:
         raise InvalidRequest(
             f"Braking is marked for {min(strangers)}, which is not among the runs; leave it out or "

@@ -1,5 +1,6 @@
 """Measurements: upload, list, look at, take back byte for byte, delete."""
 
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Annotated, Any
 
@@ -40,6 +41,7 @@ def measurement_to_json(kept: Measurement) -> dict[str, Any]:
         "sample": kept.sample,
         "noise": kept.noise,
         "manoeuvre": kept.manoeuvre,
+        "conditioning": kept.conditioning and kept.conditioning["steps"],
         **kept.summary,
     }
 
@@ -80,10 +82,14 @@ def histories(
     ] = None,
     max_samples: Annotated[int | None, Query(ge=2, le=2_000_000)] = None,
     decimate: frames.Decimate = "extremes",
+    conditioned: Annotated[
+        bool, Query(description="False for the recording before anything is done to it.")
+    ] = True,
 ) -> Response:
     """The recording's histories in SI: binary, JSON or CSV."""
     form = frames.form_of(request.headers.get("accept"))
-    run = services.recordings.run(services.store.measurement(sid, mid))
+    kept = services.store.measurement(sid, mid)
+    run = services.recordings.run(kept) if conditioned else services.recordings.raw(kept)
     if form == "csv":
         return csv_reply(run)
     names = None if channels is None else [name for name in channels.split(",") if name]
@@ -120,8 +126,9 @@ def _note(services: Services, sid: str, kept: Measurement, received: Upload) -> 
             f"{received.name} states no noise of {', '.join(OUTPUT_CHANNELS)}; write [noise] and "
             'below it lines such as "chassis.z" = 0.0005, in SI.'
         )
-    run = parse(services.store.original(kept).read_bytes(), kept.name, noise)
-    return services.store.set_noise(sid, kept.id, run.noise, summary(run))
+    known = parse(services.store.original(kept).read_bytes(), kept.name, noise).noise
+    found = summary(services.recordings.run(replace(kept, noise=dict(known))))
+    return services.store.set_noise(sid, kept.id, known, found)
 
 
 @router.put("/{mid}/manoeuvre", openapi_extra=openapi("application/json"))

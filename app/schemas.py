@@ -227,6 +227,16 @@ class RoadPreview(WireForm):
     points: Annotated[Whole, Field(ge=2, le=20_000)] = 2000
 
 
+class ConditioningRequest(WireForm):
+    """Steps that are done to a measurement before it is used; none for the recording as it is.
+
+    vehicle : whose dimensions the steps take that need some, in place of the session's car
+    """
+
+    steps: Annotated[list[JsonObject], Field(max_length=100)]
+    vehicle: JsonObject | None = None
+
+
 class StartValues(WireForm):
     """Where parameters start, SI, by name."""
 

@@ -40,7 +40,12 @@ class Session:
 
 @dataclass(frozen=True)
 class Measurement:
-    """One uploaded recording: `summary` is what was found in it, `manoeuvre` what was driven."""
+    """One uploaded recording.
+
+    summary : what was found in it
+    manoeuvre : what was driven
+    conditioning : what is done to it before it is used, {"steps": [...], "vehicle": {...} or None}
+    """
 
     id: str
     name: str
@@ -51,6 +56,7 @@ class Measurement:
     noise: dict[str, float]
     summary: dict[str, Any]
     manoeuvre: dict[str, Any] | None
+    conditioning: dict[str, Any] | None
 
 
 @dataclass(frozen=True)
@@ -228,10 +234,13 @@ class Store:
             measurements.c.session == session
         )
         made = size.select_from(jobs.join(job_files).join(uploads)).where(jobs.c.session == session)
-        driven = select(func.coalesce(func.sum(func.length(measurements.c.manoeuvre)), 0)).where(
-            measurements.c.session == session
+        texts = (
+            select(func.coalesce(func.sum(func.length(column)), 0)).where(
+                measurements.c.session == session
+            )
+            for column in (measurements.c.manoeuvre, measurements.c.conditioning)
         )
-        total = sum(connection.execute(part).scalar_one() for part in (measured, made, driven))
+        total = sum(connection.execute(part).scalar_one() for part in (measured, made, *texts))
         if total + more > self.limits.session_bytes:
             raise Busy(
                 f"The session's measurements and sweeps would exceed "
@@ -275,6 +284,23 @@ class Store:
         """Keep what was driven in a measurement, None where it is not known; `Busy` as of files."""
         text = _optional(manoeuvre)
         return self._set_of(session, measurement, more=len(text or ""), manoeuvre=text)
+
+    def set_conditioning(
+        self,
+        session: str,
+        measurement: str,
+        conditioning: Mapping[str, Any] | None,
+        summary: Mapping[str, Any],
+    ) -> Measurement:
+        """Keep what is done to a measurement, None for nothing, and what is found in it then."""
+        text = _optional(conditioning)
+        return self._set_of(
+            session,
+            measurement,
+            more=len(text or ""),
+            conditioning=text,
+            summary=json.dumps(dict(summary)),
+        )
 
     def _set_of(
         self, session: str, measurement: str, *, more: int = 0, **values: Any
@@ -372,6 +398,7 @@ def _measurement(row: Row[Any]) -> Measurement:
         noise=json.loads(row.noise),
         summary=json.loads(row.summary),
         manoeuvre=row.manoeuvre and json.loads(row.manoeuvre),
+        conditioning=row.conditioning and json.loads(row.conditioning),
     )
 
 

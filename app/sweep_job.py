@@ -13,7 +13,7 @@ from typing import Any
 from .errors import OverBudget
 from .job_store import Job
 from .jobs import Kind, digest
-from .recordings import Recordings
+from .recordings import Recordings, as_stated, stated
 from .schemas import FullFactorialForm, SweepRequest
 from .settings import Limits
 from .store import Measurement, Store
@@ -33,7 +33,8 @@ def sweep(store: Store, recordings: Recordings) -> Kind:
 
     def payload(job: Job) -> dict[str, Any]:
         runs = [
-            recordings.run(store.measurement(job.session, run["id"])) for run in job.spec["runs"]
+            recordings.run(as_stated(store.measurement(job.session, run["id"]), run))
+            for run in job.spec["runs"]
         ]
         return {**job.spec, "run": runs[0] if runs else None}
 
@@ -95,7 +96,7 @@ def check_and_fill(
     driven = stepped_alike(car, design, driven)
     spec = request.model_dump(mode="json", exclude={"key"})
     spec |= {"vehicle": vehicle_to_json(car), "design": design.to_json()}
-    spec["runs"] = [] if kept is None else [{"id": kept.id, "name": kept.name}]
+    spec["runs"] = [] if kept is None else [stated(kept)]
     if mode != "rims":
         spec |= {name: getattr(driven, name) for name in ("step", "sample_step")}
     if mode == "manoeuvre":

@@ -18,8 +18,14 @@ from sqlalchemy import (
     UniqueConstraint,
 )
 
-SCHEMA_VERSION = 3
-"""Version 1 had no files of jobs, version 2 no manoeuvres of measurements."""
+MIGRATIONS: tuple[tuple[str, ...], ...] = (
+    (),  # Tables that a version lacks are made anyway: here the files of jobs.
+    ("ALTER TABLE measurements ADD COLUMN manoeuvre TEXT",),
+    ("ALTER TABLE measurements ADD COLUMN conditioning TEXT",),
+)
+"""What leads from each version of the schema, the first being 1, to the next."""
+
+SCHEMA_VERSION = 1 + len(MIGRATIONS)
 
 metadata = MetaData()
 
@@ -64,6 +70,7 @@ measurements = Table(
     Column("noise", Text, nullable=False, default="{}"),
     Column("summary", Text, nullable=False),
     Column("manoeuvre", Text),
+    Column("conditioning", Text),
 )
 
 jobs = Table(

@@ -6,7 +6,6 @@ the database nor the data directory and may be another machine.
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 from ..engine.vehicle_file import vehicle_from_json
@@ -14,7 +13,7 @@ from .errors import Conflict, InvalidRequest
 from .identification_job import check_budget
 from .job_store import Job
 from .jobs import Kind
-from .recordings import Recordings, with_braking
+from .recordings import Recordings, as_stated, stated, with_braking
 from .schemas import ValidationRequest
 from .settings import Limits
 from .store import Measurement, Store
@@ -52,9 +51,7 @@ def check_and_fill(
         )
     held = [store.measurement(session, one) for one in request.hold_out]
     runs = [{**one, "role": "fit"} for one in fitted.spec["runs"]]
-    runs += [
-        {"id": one.id, "name": one.name, "noise": one.noise, "role": "hold-out"} for one in held
-    ]
+    runs += [{**stated(one), "role": "hold-out"} for one in held]
     for field in ("manoeuvres", "braking"):
         if strangers := set(getattr(request, field)) - {one["id"] for one in runs}:
             raise InvalidRequest(
@@ -95,10 +92,10 @@ def _driven(request: ValidationRequest, kept: Sequence[Measurement]) -> dict[str
 
 
 def _runs(spec: Mapping[str, Any], session: str, store: Store, recordings: Recordings) -> list[Any]:
-    """The recordings with the noise and the braking that the job states."""
+    """The recordings with the noise, the braking and the conditioning that the job states."""
     found = []
     for one in spec["runs"]:
-        kept: Measurement = replace(store.measurement(session, one["id"]), noise=one["noise"])
+        kept = as_stated(store.measurement(session, one["id"]), one)
         found.append(with_braking(recordings.run(kept), spec["braking"].get(one["id"])))
     return found
 

@@ -57,6 +57,14 @@ def steps_to_json(steps: Sequence[Step]) -> list[dict[str, Any]]:
     return [record_to_json(step) for step in steps]
 
 
+def needs_vehicle(steps: Sequence[Step]) -> bool:
+    """Whether what steps do depends on a vehicle."""
+    return any(
+        isinstance(step, RimFromTravel) or (isinstance(step, Speed) and step.source == "wheels")
+        for step in steps
+    )
+
+
 def read_steps(path: Path) -> Steps:
     """The steps in a JSON file."""
     return steps_from_json(read_json(path, ConditioningError), path.name)

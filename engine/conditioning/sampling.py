@@ -25,6 +25,10 @@ GAP_STEPS = 1.5
 """Usual steps from which on two samples have a gap between them."""
 
 
+MOST_NUMBERS = 2e7
+"""Of all channels of a run together, 160 MB."""
+
+
 @dataclass(frozen=True, slots=True)
 class Cut:
     """Keep the samples from `begin` to `end`, s; None for the record's own."""
@@ -61,7 +65,7 @@ class Fill:
 
     def apply(self, run: Run, vehicle: Vehicle | None) -> Done:
         """The run without gaps in the channels."""
-        time = self._whole(run.time)
+        time = self._whole(run)
         names = self.channels or tuple(run.columns)
         found, filled, longest = {}, {}, 0.0
         for name in run.columns:
@@ -87,12 +91,14 @@ class Fill:
             sentences=(f"Filled samples: {told or 'none'}; the longest gap has {longest:.3g} s.",),
         )
 
-    def _whole(self, time: Array) -> Array:
+    def _whole(self, run: Run) -> Array:
         """The times with those put in that are missing."""
+        time = run.time
         steps = np.diff(time)
         usual = float(np.median(steps))
         gaps = np.flatnonzero(steps > GAP_STEPS * usual)
         self._refuse_longer(time, gaps, gaps + 1, "the record")
+        _require_fewer(run, len(time) + float(np.sum(steps[gaps] / usual)), "cut the record")
         parts = [np.linspace(time[k], time[k + 1], round(steps[k] / usual) + 1)[1:-1] for k in gaps]
         return np.sort(np.concatenate([time, *parts]))
 
@@ -170,6 +176,7 @@ class Resample:
                 f"{run.time[widest + 1]:.4g} s; fill or cut it before."
             )
         count = math.floor(run.duration * self.rate_hz + 1e-6) + 1
+        _require_fewer(run, count, "lower rate_hz")
         if count < FEWEST_SAMPLES:
             raise ConditioningError(
                 f"{count} samples would be left, at least {FEWEST_SAMPLES} are needed; raise "
@@ -195,6 +202,16 @@ class Resample:
             band_hz=(None, cutoff if down else 0.5 * before),
             sentences=(f"From {before:.4g} Hz, {spacing}, to {self.rate_hz:g} Hz{filtered}.",),
             noise={name: passed * value for name, value in run.noise.items()},
+        )
+
+
+def _require_fewer(run: Run, samples: float, remedy: str) -> None:
+    """Refuse more numbers than memory should hold."""
+    numbers = samples * (1 + len(run.columns))
+    if numbers > MOST_NUMBERS:
+        raise ConditioningError(
+            f"{samples:.3g} samples of {len(run.columns)} channels would be made, more than "
+            f"{MOST_NUMBERS:.0e} numbers; {remedy}."
         )
 
 

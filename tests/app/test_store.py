@@ -97,16 +97,18 @@ def test_a_database_of_another_version_is_refused(tmp_path):
     DataDirectory(tmp_path).close()
 
 
-@pytest.mark.parametrize("version", [1, 2])
+@pytest.mark.parametrize("version", [1, 2, 3])
 def test_a_database_of_an_earlier_version_is_taken_over(tmp_path, version):
-    """Oracle: what it kept; afterwards it keeps files of jobs and manoeuvres like any other."""
+    """Oracle: what it kept; afterwards it keeps files of jobs, manoeuvres and steps."""
     store = Store(tmp_path, Limits())
     session, _ = store.create_session(CAR, [recording()])
     done, job = queued(store, session), queued(store, session)
     store.jobs.finish(done, "done", result={"cost": 1.5})
     store.close()
     with sqlite3.connect(tmp_path / "ridetune.sqlite") as connection:
-        connection.execute("ALTER TABLE measurements DROP COLUMN manoeuvre")
+        connection.execute("ALTER TABLE measurements DROP COLUMN conditioning")
+        if version < 3:
+            connection.execute("ALTER TABLE measurements DROP COLUMN manoeuvre")
         if version == 1:
             connection.execute("DROP TABLE job_files")
         connection.execute("UPDATE schema_version SET version = ?", [version])
@@ -114,7 +116,9 @@ def test_a_database_of_an_earlier_version_is_taken_over(tmp_path, version):
     store = Store(tmp_path, Limits())
     assert store.jobs.get(session, done).result == {"cost": 1.5}
     [kept] = store.measurements(session)
-    assert kept.manoeuvre is None
+    assert (kept.manoeuvre, kept.conditioning) == (None, None)
+    done = store.set_conditioning(session, kept.id, {"steps": [], "vehicle": None}, kept.summary)
+    assert done.conditioning == {"steps": [], "vehicle": None}
     assert store.set_manoeuvre(session, kept.id, {"name": "lap"}).manoeuvre == {"name": "lap"}
     assert store.finish_job(job, "done", result={}, file=b"rows")
     store.close()

@@ -1,0 +1,83 @@
+"""What is done to a measurement before it is used: the steps, what they did, what is suggested."""
+
+from dataclasses import replace
+from typing import Any
+
+from fastapi import APIRouter
+from starlette.concurrency import run_in_threadpool
+
+from .access import SessionId
+from .recordings import summary
+from .routes_measurements import measurement_to_json
+from .schemas import ConditioningRequest
+from .services import Services, Shared
+from .store import Measurement
+from .strict_json import StrictRoute
+
+router = APIRouter(
+    prefix="/api/sessions/{sid}/measurements/{mid}/conditioning",
+    tags=["measurements"],
+    route_class=StrictRoute,
+)
+
+
+@router.get("")
+async def conditioning(sid: SessionId, mid: str, services: Shared) -> dict[str, Any]:
+    """The steps in force, what each of them did, and those that the recording calls for."""
+    kept = services.store.measurement(sid, mid)
+    async with services.parsing:
+        return await run_in_threadpool(_shown, services, sid, kept)
+
+
+@router.put("")
+async def set_conditioning(
+    sid: SessionId, mid: str, services: Shared, body: ConditioningRequest
+) -> dict[str, Any]:
+    """Do these steps to the recording; the original stays, and so does what jobs were given."""
+    kept = services.store.measurement(sid, mid)
+    async with services.parsing:
+        return await run_in_threadpool(_condition, services, sid, kept, body)
+
+
+def _condition(
+    services: Services, sid: str, kept: Measurement, body: ConditioningRequest
+) -> dict[str, Any]:
+    # They bring scipy, which is loaded with the first simulation.
+    from ..engine.conditioning.chain import needs_vehicle, steps_from_json, steps_to_json
+    from ..engine.vehicle_file import vehicle_from_json, vehicle_to_json
+
+    steps = steps_from_json(body.steps)
+    asked = None
+    if steps:
+        vehicle = None
+        if needs_vehicle(steps):
+            told = services.store.session(sid).vehicle if body.vehicle is None else body.vehicle
+            vehicle = vehicle_to_json(vehicle_from_json(told))
+        asked = {"steps": steps_to_json(steps), "vehicle": vehicle}
+    done = replace(kept, conditioning=asked)
+    found = summary(services.recordings.run(done))
+    return _shown(services, sid, services.store.set_conditioning(sid, kept.id, asked, found))
+
+
+def _shown(services: Services, sid: str, kept: Measurement) -> dict[str, Any]:
+    from ..engine.conditioning.chain import steps_to_json
+    from ..engine.conditioning.suggestion import suggest
+    from ..engine.step_record import step_record_to_json
+    from ..engine.vehicle_file import vehicle_from_json
+
+    in_force = kept.conditioning or {"steps": [], "vehicle": None}
+    vehicle = vehicle_from_json(services.store.session(sid).vehicle)
+    found = suggest(services.recordings.raw(kept), vehicle)
+    record = services.recordings.run(kept).conditioning
+    return {
+        "steps": in_force["steps"],
+        "vehicle": in_force["vehicle"],
+        "record": [step_record_to_json(one) for one in record],
+        "suggestion": {
+            "steps": steps_to_json(found.steps),
+            "reasons": list(found.reasons),
+            "lacks": list(found.lacks),
+            "output_highpass_hz": found.output_highpass_hz,
+        },
+        "measurement": measurement_to_json(kept),
+    }
