@@ -89,6 +89,7 @@ def command_line() -> "Parser":
     _describe_serve(add("serve", _serve, "Serve the page and the REST interface."))
     _describe_simulate(add("simulate", _simulate, "Simulate a car on a road, from rims or posts."))
     _describe_sweep(add("sweep", _sweep, "Simulate many cars, one row a car."))
+    _describe_condition(add("condition", _condition, "Make a fit's inputs of a raw recording."))
     _describe_identify(add("identify", _identify, "Identify a car's parameters from recordings."))
     _describe_validate(add("validate", _validate, "Identify a car and report what it predicts."))
     _describe_campaign(add("campaign", _campaign, "Measure a car that is known, as files."))
@@ -209,6 +210,19 @@ def _describe_sweep(command: Parser) -> None:
         help="the rows; .parquet, .arrow, .feather or .csv",
     )
     command.set_defaults(road_seed=None)
+
+
+def _describe_condition(command: Parser) -> None:
+    command.add_argument("run_file", metavar="RUN", help="recording, CSV")
+    command.add_argument("--vehicle", metavar="FILE", help="vehicle or fit file, or a known car")
+    how = command.add_mutually_exclusive_group()
+    how.add_argument("--steps", metavar="FILE", help="steps, JSON; those suggested unless told")
+    how.add_argument(
+        "--suggest", action="store_true", help="print the suggested steps as JSON, do nothing"
+    )
+    command.add_argument(
+        "-o", "--output", metavar="FILE", help="the recording as CSV, its record beside it as TOML"
+    )
 
 
 def _describe_identify(command: Parser) -> None:
@@ -393,6 +407,12 @@ def _sweep(options: argparse.Namespace) -> None:
     from .commands.sweep import sweep
 
     sweep(options)
+
+
+def _condition(options: argparse.Namespace) -> None:
+    from .commands.condition import condition
+
+    condition(options)
 
 
 def _identify(options: argparse.Namespace) -> None:

@@ -8,7 +8,7 @@ may state noise and description (see `run_notes`).
 import io
 import re
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
 from pathlib import Path
 from types import MappingProxyType
@@ -60,7 +60,8 @@ def read_run(path: str | Path, *, noise: Mapping[str, float] | None = None) -> R
     notes = read_notes(beside) if beside.is_file() else RunNotes()
     try:
         with path.open("rb") as stream:
-            return _run(stream, path.name, {**notes.noise, **(noise or {})}, notes.description)
+            run = _run(stream, path.name, {**notes.noise, **(noise or {})}, notes.description)
+            return replace(run, conditioning=notes.conditioning)
     except OSError as error:
         raise MeasurementError(
             f"{path}: the file cannot be read ({error.strerror}); check the path."

@@ -17,6 +17,7 @@ from .manoeuvre import manoeuvre_to_json
 from .mdf4 import run_to_mdf4
 from .measurement import run_to_csv
 from .sensors import ANTIALIAS_ORDER, SensorSet
+from .toml_text import toml_table, toml_value
 from .vehicle_file import vehicle_to_json
 
 Form = Literal["csv", "mf4"]
@@ -57,20 +58,13 @@ def names_of(names: Iterable[str], form: Form) -> list[str]:
 def notes(recording: Recording, campaign: Campaign, date: datetime) -> str:
     """What `read_run` finds beside a recording, and what a person wants to know, as TOML."""
     assert recording.run is not None
-    facts = {name: _quoted(text) for name, text in _facts(recording, campaign).items()}
+    facts = {name: toml_value(text) for name, text in _facts(recording, campaign).items()}
     facts |= {"date": date.isoformat(), "rate_hz": repr(campaign.sensors.rate_hz)}
     lines = [f"{name} = {value}" for name, value in facts.items()]
-    lines += ["", "[noise]"]
-    lines += [f"{json.dumps(name)} = {value!r}" for name, value in recording.run.noise.items()]
+    lines += toml_table("[noise]", recording.run.noise)
     for name, stated in _stated(campaign.sensors).items():
-        lines += ["", f"[sensors.{json.dumps(name)}]"]
-        lines += [f"{key} = {value!r}" for key, value in stated.items()]
+        lines += toml_table(f"[sensors.{toml_value(name)}]", stated)
     return "\n".join([*lines, ""])
-
-
-def _quoted(text: str) -> str:
-    """A text as TOML writes it: as JSON does, but for pairs of escapes and a bare delete."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _facts(recording: Recording, campaign: Campaign) -> dict[str, str]:

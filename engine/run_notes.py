@@ -5,6 +5,8 @@
     [noise]                  # standard deviation of the measurement noise by channel, SI
     "chassis.z" = 0.0005     # the quotes may be left off
 
+    [[conditioning]]         # what `ridetune condition` did, step by step
+
 Other keys are for other readers, such as the vehicle that was driven.
 """
 
@@ -18,9 +20,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .channels import channel
+from .channels import Run, channel
 from .errors import MeasurementError
-from .toml_text import LARGEST_FILE, parse_toml
+from .step_record import StepRecord, step_record_to_json, step_records_from_json
+from .toml_text import LARGEST_FILE, parse_toml, toml_table, toml_value
 
 DEFAULT_NOISE = {
     "chassis.z": 0.5e-3,
@@ -38,10 +41,11 @@ SHARE_OF_LARGEST = 0.01
 
 @dataclass(frozen=True, slots=True)
 class RunNotes:
-    """Noise in SI by channel, and a text for a person."""
+    """Noise in SI by channel, a text for a person, and what conditioning did to the recording."""
 
     noise: Mapping[str, float] = field(default_factory=dict)
     description: str = ""
+    conditioning: tuple[StepRecord, ...] = ()
 
 
 def notes_beside(recording: Path) -> Path:
@@ -80,7 +84,21 @@ def parse_notes(data: bytes, source: str) -> RunNotes:
         raise MeasurementError(
             f'{source}: noise must be a table: [noise] and lines such as "chassis.z" = 0.0005.'
         )
-    return RunNotes(checked_noise(_flat(noise), source), description)
+    done = step_records_from_json(notes.get("conditioning", []), source)
+    return RunNotes(checked_noise(_flat(noise), source), description, done)
+
+
+def notes_of(run: Run) -> str:
+    """What a run knows of itself as the text of a file that `parse_notes` reads."""
+    lines = [f"description = {toml_value(run.description)}"]
+    lines += toml_table("[noise]", run.noise)
+    for record in map(step_record_to_json, run.conditioning):
+        lists = {name: one for name, one in record.items() if isinstance(one, list)}
+        lines += toml_table("[[conditioning]]", lists)
+        for name, one in record.items():
+            if name not in lists:
+                lines += toml_table(f"[conditioning.{name}]", one)
+    return "\n".join([*lines, ""])
 
 
 def checked_noise(noise: Mapping[str, Any], source: str) -> dict[str, float]:

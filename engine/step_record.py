@@ -27,18 +27,22 @@ class StepRecord:
 
 
 def step_record_to_json(record: StepRecord) -> dict[str, Any]:
-    """A record as plain JSON data."""
+    """A record as plain JSON data; an end that a band does not have is left out."""
     return {
         "step": dict(record.step),
         "channels": list(record.channels),
         "numbers": dict(record.numbers),
-        "band_hz": list(record.band_hz),
+        "band_hz": {
+            name: end
+            for name, end in zip(("low", "high"), record.band_hz, strict=True)
+            if end is not None
+        },
         "sentences": list(record.sentences),
     }
 
 
 def step_records_from_json(data: Any, source: str) -> tuple[StepRecord, ...]:
-    """Records out of JSON data; `source` heads the message of a MeasurementError."""
+    """Records out of JSON data, or TOML's; `source` heads the message of a MeasurementError."""
     if not isinstance(data, list) or not all(map(_is_record, data)):
         raise MeasurementError(
             f"{source}: conditioning must be a list of what was done, as `ridetune condition` "
@@ -49,7 +53,7 @@ def step_records_from_json(data: Any, source: str) -> tuple[StepRecord, ...]:
             dict(one["step"]),
             tuple(one["channels"]),
             {name: float(value) for name, value in one["numbers"].items()},
-            (one["band_hz"][0], one["band_hz"][1]),
+            (one["band_hz"].get("low"), one["band_hz"].get("high")),
             tuple(one["sentences"]),
         )
         for one in data
@@ -62,9 +66,9 @@ def _is_record(one: Any) -> bool:
         "channels": _texts,
         "numbers": lambda value: isinstance(value, Mapping) and all(map(_number, value.values())),
         "band_hz": lambda value: (
-            isinstance(value, list)
-            and len(value) == 2
-            and all(end is None or _number(end) for end in value)
+            isinstance(value, Mapping)
+            and value.keys() <= {"low", "high"}
+            and all(map(_number, value.values()))
         ),
         "sentences": _texts,
     }

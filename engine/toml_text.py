@@ -1,6 +1,8 @@
-"""The text of a TOML file, parsed at a cost that its size bounds, with a clear sentence."""
+"""TOML: a file's text parsed at a cost that its size bounds, and values as text."""
 
+import json
 import tomllib
+from collections.abc import Mapping
 from typing import Any
 
 from .errors import MeasurementError
@@ -27,3 +29,20 @@ def parse_toml(data: bytes, source: str) -> dict[str, Any]:
         return tomllib.loads(data.decode("utf-8-sig").replace("\r\n", "\n"))
     except (ValueError, RecursionError) as error:
         raise MeasurementError(f"{source}: not valid TOML ({error}); correct it.") from error
+
+
+def toml_value(value: Any) -> str:
+    """A text, a truth value, a number or a list of these as TOML writes it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        # As JSON does, but for pairs of escapes and a bare delete.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, list):
+        return "[" + ",".join(f"\n  {toml_value(item)}" for item in value) + "]"
+    return repr(float(value)) if isinstance(value, float) else repr(value)
+
+
+def toml_table(name: str, table: Mapping[str, Any]) -> list[str]:
+    """Lines of a table whose values `toml_value` knows; `name` with its brackets."""
+    return ["", name, *(f"{toml_value(key)} = {toml_value(one)}" for key, one in table.items())]

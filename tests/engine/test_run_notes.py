@@ -1,9 +1,18 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from ridetune.engine.channels import Run
 from ridetune.engine.errors import MeasurementError
-from ridetune.engine.run_notes import checked_noise, doubtful_noise, parse_notes, read_notes
+from ridetune.engine.run_notes import (
+    checked_noise,
+    doubtful_noise,
+    notes_of,
+    parse_notes,
+    read_notes,
+)
+from ridetune.engine.step_record import StepRecord
 from ridetune.engine.toml_text import LARGEST_FILE
 
 
@@ -84,3 +93,23 @@ def test_noise_in_the_wrong_unit_is_doubted_by_name(name, stated, doubted):
 def test_noise_given_otherwise_is_checked_the_same_way():
     with pytest.raises(MeasurementError, match="run: noise of chassis.z is 0.0"):
         checked_noise({"chassis.z": 0.0}, "run")
+
+
+def test_what_conditioning_did_goes_into_notes_and_back():
+    """Quotes, backslashes and a channel's dots in the keys among it."""
+    record = StepRecord(
+        {"kind": "rest", "channels": ["chassis.z"], "interval": [0.0, 1.5]},
+        ("chassis.z",),
+        {"offset.chassis.z": -1.25e-3, "begin_s": 0.0},
+        (0.3, None),
+        ('Took "off" a \\ and é.', "Another."),
+    )
+    run = Run("r", [0.0, 1.0], {"chassis.z": [0.0, 1.0]}, {"chassis.z": 1e-4}, (), 'a "b"')
+    notes = parse_notes(notes_of(replace(run, conditioning=(record,) * 2)).encode(), "r.toml")
+    assert notes.conditioning == (record, record)
+    assert (notes.noise, notes.description) == ({"chassis.z": 1e-4}, 'a "b"')
+
+
+def test_a_record_of_conditioning_that_is_none_is_refused():
+    with pytest.raises(MeasurementError, match="^r.toml: conditioning must be a list of what was"):
+        parse_notes(b"conditioning = 3", "r.toml")

@@ -1,0 +1,93 @@
+"""`ridetune condition`: what it prints and writes, and what a fit says of its inputs."""
+
+import json
+
+import pytest
+from ridetune.app.cli import main
+from ridetune.engine.measurement import missing_for_identification, read_run, write_run
+from ridetune.engine.vehicle_file import write_vehicle
+
+from ..factories import paper_vehicle
+from ..raw_sensors import drive, recorded
+
+CAR = paper_vehicle()
+
+
+@pytest.fixture(scope="module")
+def raw():
+    return recorded(CAR, drive(CAR, sample_step=0.005), seed=3)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch, raw):
+    monkeypatch.chdir(tmp_path)
+    write_run(raw, "raw.csv")
+    write_vehicle(CAR, "car.json")
+    (tmp_path / "raw.toml").write_text('description = "wet"\n[noise]\n"chassis.body_a_z" = 0.03\n')
+    return tmp_path
+
+
+def test_the_suggested_steps_can_be_edited_and_done(folder, capsys):
+    assert main(["condition", "raw.csv", "--vehicle", "car.json", "--suggest"]) == 0
+    told = capsys.readouterr()
+    steps = json.loads(told.out)
+    assert [step["kind"] for step in steps][-1] == "rim-from-travel"
+    assert "Compare the run with --output-highpass 0.6." in told.err
+    steps[-1]["geometry"] = "arm"
+    (folder / "steps.json").write_text(json.dumps(steps))
+    command = ["condition", "raw.csv", "--vehicle", "car.json", "--steps", "steps.json"]
+    assert main([*command, "-o", "done.csv"]) == 0
+    printed = capsys.readouterr().out
+    assert "chassis.z from 0.3 to 40 Hz; an error of 1 mg at 0.3 Hz is 2.8 mm." in printed
+    done = read_run("done.csv")
+    assert missing_for_identification(done) == ()
+    assert [record.step for record in done.conditioning] == steps
+    assert done.description == "wet"
+    assert done.noise["chassis.body_a_z"] == 0.03
+    # What it wrote itself it writes over.
+    assert main([*command, "-o", "done.csv"]) == 0
+    assert read_run("done.csv").conditioning == done.conditioning
+
+
+def test_a_fit_says_how_its_inputs_came_about(folder, capsys):
+    assert main(["condition", "raw.csv", "--vehicle", "car.json", "-o", "done.csv"]) == 0
+    command = ["identify", "done.csv", "--vehicle", "car.json", "--free", "K_F", "-o", "fit.json"]
+    assert main([*command, "--output-highpass", "0.6"]) == 0
+    [run] = json.loads((folder / "fit.json").read_text())["runs"]
+    kinds = [record["step"]["kind"] for record in run["conditioning"]]
+    assert kinds[0] == "rest"
+    assert kinds[-1] == "rim-from-travel"
+    assert run["conditioning"][-2]["band_hz"] == {"low": 0.3, "high": 40.0}
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (["--steps", "none.json"], "none.json: cannot be read"),
+        (
+            ["--steps", "bad.json"],
+            'bad.json: step[0].kind "rset" is not known; did you mean "rest"?',
+        ),
+        (["--steps", "rims.json"], "where the wheels are is not known; give a vehicle"),
+        (["--suggest", "-o", "done.csv"], "--suggest does nothing to the run"),
+        (["-o", "raw.csv"], "raw.csv: this is raw.csv itself, which the command reads"),
+        (["-o", "other.csv"], "other.toml: these notes were not written by this command"),
+        (["-o", "done.toml"], "done.toml: its notes would be the same file"),
+    ],
+)
+def test_bad_input_is_one_line(folder, capsys, options, sentence):
+    (folder / "bad.json").write_text('[{"kind": "rset"}]')
+    (folder / "rims.json").write_text('[{"kind": "rim-from-travel"}]')
+    (folder / "other.toml").write_text('description = "mine"\n')
+    assert main(["condition", "raw.csv", *options]) == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert line.startswith("ridetune: ")
+    assert sentence in line
+    assert (folder / "other.toml").read_text() == 'description = "mine"\n'
+
+
+def test_steps_and_suggest_exclude_each_other(folder, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["condition", "raw.csv", "--suggest", "--steps", "s.json"])
+    assert ended.value.code == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
