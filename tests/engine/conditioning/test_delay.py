@@ -8,6 +8,9 @@ from ridetune.engine.errors import ConditioningError
 from ridetune.engine.filters import in_band
 from scipy.interpolate import CubicSpline
 
+from ...factories import paper_vehicle
+from ...raw_sensors import drive, recorded
+
 STEP = 0.005
 TIME = np.arange(0.0, 20.0, STEP)
 BAND = (0.5, 5.0)
@@ -104,6 +107,15 @@ def test_what_cannot_be_found_is_said_in_one_sentence(how, sentence):
     run = Run("r", TIME, {"chassis.z": signal()(TIME), **others})
     with pytest.raises(ConditioningError, match=f"^Run r, step 1, delay: .*{sentence}"):
         condition(run, [Delay("chassis.z", **how)])
+
+
+def test_a_late_gps_is_found_against_an_accelerometer():
+    """Oracle: the delay, within two standard errors, which hold what gravity adds by the pitch."""
+    car = paper_vehicle()
+    raw = recorded(car, drive(car, sample_step=0.005), seed=4, delay=0.12)
+    step = Delay("chassis.v_x", reference="chassis.body_a_x", order=-1, band_hz=(0.2, 2.0))
+    numbers = condition(raw, [step]).conditioning[0].numbers
+    assert abs(numbers["delay_s"] - 0.12) < 2.0 * numbers["standard_error_s"] < 0.02
 
 
 @pytest.mark.parametrize("how", [{}, {"seconds": 0.1, "reference": "chassis.a_z"}])
