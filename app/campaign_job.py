@@ -54,8 +54,8 @@ def check_and_fill(
     vehicle : of the session, where the request has none
     """
     from ..engine.campaign import CAMPAIGN, roughened
+    from ..engine.formats.readers import require_package
     from ..engine.manoeuvre import manoeuvre_to_json
-    from ..engine.mdf4 import require_asammdf
     from ..engine.vehicle_file import vehicle_to_json
 
     known = known_plant(request.plant, with_vehicle=request.vehicle is not None)
@@ -64,7 +64,7 @@ def check_and_fill(
             "noise and sensors both tell the noise; leave out noise.", field="noise"
         )
     if request.format == "mf4":
-        require_asammdf()
+        require_package("MDF4")
     chosen = _chosen(CAMPAIGN if request.manoeuvres is None else request.manoeuvres)
     changed = roughened(chosen, request.class_factor, request.band, request.road_seed)
     spec = request.model_dump(mode="json", exclude={"key"})

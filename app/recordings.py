@@ -121,7 +121,7 @@ def parse(data: bytes, name: str, noise: Mapping[str, float] | None = None) -> R
     from ..engine.measurement import parse_run
 
     try:
-        return parse_run(data, name, noise=noise)
+        return parse_run(data, name, noise=noise, apart=True)
     except (RecursionError, MemoryError, OverflowError) as error:
         raise MeasurementError(
             f"{name}: the file is too large or too deep to read ({type(error).__name__}); "

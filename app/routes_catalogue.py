@@ -145,11 +145,11 @@ def plants() -> list[dict[str, Any]]:
 @router.get("/formats")
 def formats() -> list[dict[str, str]]:
     """The forms of a campaign's recordings; missing : why one cannot be written here, else ""."""
-    from ..engine.mdf4 import missing_asammdf
+    from ..engine.formats.readers import missing_package
 
     return [
         {"key": "csv", "name": "CSV", "missing": ""},
-        {"key": "mf4", "name": "MDF4", "missing": missing_asammdf()},
+        {"key": "mf4", "name": "MDF4", "missing": missing_package("MDF4")},
     ]
 
 

@@ -2,9 +2,10 @@
 
 Read are UTF-8 (with or without its mark), UTF-16 and UTF-32; commas, semicolons or tabs between
 the columns, the last two also with decimal commas; quotes, blank lines, Excel's `sep=` line and
-any line ending. The file is read as a stream and its numbers by numpy, so memory is that of the
-numbers. Only when numpy refuses, or reads something that is not finite, is the file gone through
-once more to name the first bad cell.
+any line ending. The names may also stand below lines of other text, above a row of units, and be
+parted by bars or spaces: see `csv_layout`. The file is read as a stream and its numbers by numpy,
+so memory is that of the numbers. Only when numpy refuses, or reads something that is not finite,
+is the file gone through once more to name the first bad cell.
 """
 
 import csv
@@ -20,6 +21,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from .csv_layout import Layout, find_layout
 from .errors import MeasurementError
 
 LARGEST_FILE = 200_000_000
@@ -41,7 +43,7 @@ _HEAD = 65_536
 _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x19\x1b-\x1f]")
 _NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
 _TITLE = re.compile(r"\s*(?P<name>[^\[\]()]*?)\s*(?:[\[(]\s*(?P<unit>[^\[\]]*?)\s*[\])])?\s*")
-_SEPARATOR_LINE = re.compile(r'"?sep=([,;\t|])"?\s*', re.IGNORECASE)
+_GAPS = ("", "nan", "-nan", "n/a", "null")
 _MARKS = (
     (b"\xff\xfe\x00\x00", "utf-32"),
     (b"\x00\x00\xfe\xff", "utf-32"),
@@ -61,7 +63,9 @@ class CsvTable:
         self._stream = stream
         self._source = source
         self._encoding = self._find_encoding()
-        self._delimiter, self._header_line, self.header = self._read_header()
+        layout = self._layout()
+        self._delimiter, self._spaces = layout.delimiter, layout.spaces
+        self._header_line, self.header = layout.line, layout.titles
         self._blank = self._delimiter + " \t\r\n\x1a\ufeff"
 
     def numbers(self, columns: Sequence[int]) -> NDArray[np.float64]:
@@ -118,6 +122,26 @@ class CsvTable:
             raise self._bad_number(line, indices[column], cell, remedy, "too large")
         return table
 
+    def with_gaps(self, column: int) -> NDArray[np.float64]:
+        """The numbers of one column (samples,), NaN where its cell is empty."""
+        try:
+            return self.numbers([column])[:, 0]
+        except MeasurementError:
+            values = [self._number_or_gap(column, *row) for row in self._rows([column])]
+        return np.array(values, dtype=np.float64)
+
+    def _number_or_gap(self, column: int, line: int, text: str) -> float:
+        cell = text.split(self._delimiter)[column].strip()
+        if cell.lower() in _GAPS:
+            return math.nan
+        if not _NUMBER.fullmatch(cell):
+            raise self._bad_cell([column], line, text)
+        return float(cell)
+
+    def count(self) -> int:
+        """Number of rows with data."""
+        return sum(1 for _ in self._rows([]))
+
     def line_of(self, row: int) -> int:
         """The line of the file, counted from 1, that holds a row of `numbers`, counted from 0."""
         return self._row(row, [])[0]
@@ -169,27 +193,19 @@ class CsvTable:
         finally:
             text.detach()
 
-    def _read_header(self) -> tuple[str, int, list[str]]:
-        """The delimiter, the header's line number and its cells."""
-        delimiter = None
-        for number, line in self._lines():
-            if separator := _SEPARATOR_LINE.fullmatch(line):
-                delimiter = separator[1]
-            elif line.strip():
-                line = _mended(line.rstrip("\n"))
-                if delimiter is None:
-                    bare = re.sub(r'"[^"]*"', "", line)
-                    delimiter = max(",;\t", key=bare.count)
-                cells = [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
-                while cells and not cells[-1]:
-                    cells.pop()
-                if len(cells) > MOST_COLUMNS:
-                    raise self._refuse(
-                        f" names {len(cells)} columns, more than {MOST_COLUMNS}; export fewer",
-                        number,
-                    )
-                return delimiter, number, cells
-        raise self._refuse("the file is blank; export the recording again")
+    def _layout(self) -> Layout:
+        """Where the header is, what parts its cells, and their texts."""
+        lines = ((number, _mended(line.rstrip("\n"))) for number, line in self._lines())
+        with closing(lines):
+            layout = find_layout(lines)
+        if layout is None:
+            raise self._refuse("the file is blank; export the recording again")
+        if len(layout.titles) > MOST_COLUMNS:
+            raise self._refuse(
+                f" names {len(layout.titles)} columns, more than {MOST_COLUMNS}; export fewer",
+                layout.line,
+            )
+        return layout
 
     def _rows(self, used: Sequence[int]) -> Generator[tuple[int, str], None, None]:
         """Line number and text of every row with data, quotes and decimal commas resolved."""
@@ -198,6 +214,8 @@ class CsvTable:
         for number, line in self._lines():
             if number <= self._header_line or not line.strip(blank):
                 continue
+            if self._spaces:
+                line = f"{' '.join(line.split())}\n"
             if '"' in line:
                 line = self._unquoted(number, line, used)
             if commas and "," in line:

@@ -3,24 +3,10 @@
 import io
 from collections.abc import Mapping
 from datetime import datetime
-from importlib.util import find_spec
 
 from .channels import Run, channel
-from .errors import MeasurementError
+from .formats.readers import require_package
 from .measurement import in_unit
-
-
-def missing_asammdf() -> str:
-    """What to do where MDF4 cannot be written for want of a package, a sentence; else empty."""
-    if find_spec("asammdf") is not None:
-        return ""
-    return "MDF4 needs asammdf, which is not installed; install ridetune[formats], or take CSV."
-
-
-def require_asammdf() -> None:
-    """Raise MeasurementError where MDF4 cannot be written."""
-    if said := missing_asammdf():
-        raise MeasurementError(said)
 
 
 def run_to_mdf4(
@@ -31,7 +17,7 @@ def run_to_mdf4(
     units : by channel, of those that are not to be in SI
     facts : description, vehicle and others, kept in the header;  date : with a time zone
     """
-    require_asammdf()
+    require_package("MDF4")
     from asammdf import MDF, Signal
 
     signals = []

@@ -1,18 +1,16 @@
-"""Measurement files: a CSV with `name [unit]` columns becomes a Run in SI, and back.
+"""Measurement files: a table whose columns are channels becomes a Run in SI; a Run becomes CSV.
 
 Names are those of the table of channels, in any case. A column of another name is left out with a
 warning, unless it looks like a misspelling of a channel the file lacks. NAME.toml beside NAME.csv
-may state noise and description (see `run_notes`).
+may state noise and description (see `run_notes`). Which kinds of file are read is in `formats`.
 """
 
-import io
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
 from pathlib import Path
 from types import MappingProxyType
-from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +24,20 @@ from .channels import (
     channel,
     find_channel,
 )
-from .csv_table import LARGEST_FILE, CsvTable, is_number, split_title
+from .clocks import clocks_of, on_one_clock
+from .csv_table import is_number, split_title
 from .errors import MeasurementError
-from .run_notes import RunNotes, checked_noise, doubtful_noise, notes_beside, read_notes
+from .formats.kinds import CSV
+from .formats.opening import opened, opened_bytes
+from .formats.table import Table
+from .run_notes import (
+    RunNotes,
+    checked_noise,
+    doubtful_noise,
+    notes_beside,
+    notes_in,
+    read_notes,
+)
 from .spikes import spikes
 from .units import UnitError, to_si
 
@@ -40,8 +49,11 @@ COARSEST_STEP = 0.2
 
 
 @dataclass(frozen=True, slots=True)
-class _Column:
-    """A column of the file that is a channel of ours, with the way from its unit to SI."""
+class Chosen:
+    """A column of the file that is a channel of ours, with the way from its unit to SI.
+
+    unit : as the file has it, "" where it has none
+    """
 
     index: int
     info: ChannelInfo
@@ -51,7 +63,7 @@ class _Column:
 
 
 def read_run(path: str | Path, *, noise: Mapping[str, float] | None = None) -> Run:
-    """Read a measurement file, and the notes beside it if there are any.
+    """Read a measurement file of any kind, and the notes beside it if there are any.
 
     noise : standard deviations in SI by channel; they go before those of the notes
     """
@@ -59,8 +71,8 @@ def read_run(path: str | Path, *, noise: Mapping[str, float] | None = None) -> R
     beside = notes_beside(path)
     notes = read_notes(beside) if beside.is_file() else RunNotes()
     try:
-        with path.open("rb") as stream:
-            run = _run(stream, path.name, {**notes.noise, **(noise or {})}, notes.description)
+        with opened(path, path.name) as table:
+            run = _run(table, {**notes.noise, **(noise or {})}, notes.description)
             return replace(run, conditioning=notes.conditioning)
     except OSError as error:
         raise MeasurementError(
@@ -68,9 +80,15 @@ def read_run(path: str | Path, *, noise: Mapping[str, float] | None = None) -> R
         ) from error
 
 
-def parse_run(data: bytes, name: str, *, noise: Mapping[str, float] | None = None) -> Run:
-    """Read the bytes of a measurement file; `name` is the run's name and heads every message."""
-    return _run(io.BytesIO(data), name, noise or {}, "")
+def parse_run(
+    data: bytes, name: str, *, noise: Mapping[str, float] | None = None, apart: bool = False
+) -> Run:
+    """Read the bytes of a measurement file; `name` is the run's name and heads every message.
+
+    apart : whether a child reads text, too, as for what strangers send
+    """
+    with opened_bytes(data, name, apart=apart) as table:
+        return _run(table, noise or {}, "")
 
 
 def write_run(run: Run, path: str | Path) -> None:
@@ -106,46 +124,94 @@ def missing_for_identification(run: Run) -> tuple[str, ...]:
     return tuple(missing)
 
 
-def _run(stream: BinaryIO, source: str, noise: Mapping[str, float], description: str) -> Run:
-    size = stream.seek(0, io.SEEK_END)
-    if size > LARGEST_FILE:
-        raise MeasurementError(
-            f"{source}: the file has {size / 1e6:.0f} MB, more than {LARGEST_FILE / 1e6:.0f} MB;"
-            " cut the recording or thin it out."
+def _run(table: Table, noise: Mapping[str, float], description: str) -> Run:
+    """The run in a table whose titles are our channels' names."""
+    chosen, warnings = _columns(table)
+    if table.kind == CSV:
+        return run_from_table(
+            table, chosen, noise=noise, description=description, warnings=warnings
         )
-    table = CsvTable(stream, source)
-    columns, warnings = _columns(table.header, source)
-    numbers = table.in_si([(column.index, column.factor, column.offset) for column in columns])
-    if len(numbers) < FEWEST_SAMPLES:
+    said = notes_in(table.comment)
+    return run_from_table(
+        table,
+        chosen,
+        noise={**said.noise, **noise},
+        description=description or said.description,
+        warnings=[*table.warnings, *warnings],
+    )
+
+
+def run_from_table(
+    table: Table,
+    chosen: Sequence[Chosen],
+    *,
+    noise: Mapping[str, float] | None = None,
+    description: str = "",
+    warnings: Sequence[str] = (),
+) -> Run:
+    """The run that some columns of a table make, checked.
+
+    chosen : the columns, each another channel; without one for the time, it is that of the
+        columns' clocks, the finest where they differ (see `one_clock`)
+    warnings : what is already known to be doubtful, which goes first
+    """
+    source, found = table.source, list(warnings)
+    ways = {one.info.name: (one.index, one.factor, one.offset) for one in chosen}
+    if "time" in ways:
+        time, values = _timed(table, ways)
+    else:
+        time, values, said = on_one_clock(table, ways)
+        found += said
+    if len(time) < FEWEST_SAMPLES:
         raise MeasurementError(
-            f"{source}: the file holds {len(numbers)} samples, at least {FEWEST_SAMPLES} are"
+            f"{source}: the file holds {len(time)} samples, at least {FEWEST_SAMPLES} are"
             " needed; record longer or sample faster."
         )
-    values = {column.info.name: numbers[:, k] for k, column in enumerate(columns)}
-    time = values.pop("time")
-    _require_increasing(time, table, source)
-    warnings += _doubtful_time(time)
-    for column in columns[1:]:
-        warnings += _doubtful_magnitude(column, time, values[column.info.name])
-    known = checked_noise(noise, source)
-    warnings += doubtful_noise(known, values)
-    return Run(source, time, values, known, tuple(warnings), description)
+    _require_increasing(time, table)
+    found += _doubtful_time(time)
+    for column in chosen:
+        if column.info.name != "time":
+            found += _doubtful_magnitude(column, time, values[column.info.name])
+    known = checked_noise(noise or {}, source)
+    found += doubtful_noise(known, values)
+    return Run(source, time, values, known, tuple(found), description)
 
 
-def _columns(header: list[str], source: str) -> tuple[list[_Column], list[str]]:
-    """The file's columns that are channels, time first, and warnings about the others."""
-    if header and all(not title or is_number(title) for title in header):
+def _timed(
+    table: Table, ways: Mapping[str, tuple[int, float, float]]
+) -> tuple[NDArray[np.float64], dict[str, NDArray[np.float64]]]:
+    """Time and channels where a column of the file is chosen for the time."""
+    if table.kind != CSV:
+        samples = table.columns[ways["time"][0]].samples
+        for name, (index, _, _) in ways.items():
+            if table.columns[index].samples != samples:
+                raise MeasurementError(
+                    f"{table.source}: {name} has {table.columns[index].samples} samples, but the"
+                    f" time has {samples}; choose columns of one clock."
+                )
+    numbers = table.in_si(list(ways.values()))
+    values = {name: numbers[:, place] for place, name in enumerate(ways)}
+    return values.pop("time"), values
+
+
+def _columns(table: Table) -> tuple[list[Chosen], list[str]]:
+    """The table's columns that are channels, time first, and warnings about the others."""
+    titles, source = table.titles(), table.source
+    names = [name for name, _ in titles]
+    if table.kind == CSV and names and all(not name or is_number(name) for name in names):
         raise MeasurementError(
             f"{source}: the first line holds numbers where the column names belong; add a header"
             " line such as time [s],chassis.z [mm],wheel.fl.z [mm]."
         )
-    found: dict[str, _Column] = {}
+    clocks = clocks_of(table)
+    found: dict[str, Chosen] = {}
     others: list[tuple[int, str]] = []
-    for index, title in enumerate(header):
-        name, unit = split_title(title)
+    for index, (name, unit) in enumerate(titles):
+        if index in clocks:
+            continue
         info = find_channel(name.lower())
         if info is None:
-            others.append((index, title))
+            others.append((index, _titled(name, unit)))
         elif info.name in found:
             raise MeasurementError(
                 f"{source}: columns {found[info.name].index + 1} and {index + 1} are both"
@@ -155,20 +221,20 @@ def _columns(header: list[str], source: str) -> tuple[list[_Column], list[str]]:
             found[info.name] = _column(index, info, unit, source)
     for index, title in others:
         _refuse_misspelling(index, title, found, source)
-    _require_channels(header, found, source)
+    _require_channels(table, found)
     warnings = []
     if bare := [f"{name} in {one.info.unit}" for name, one in found.items() if not one.unit]:
         warnings.append(f"Columns without a unit were read as SI: {', '.join(bare)}.")
     if others:
-        titles = [_shortened(title) if title else f"column {index + 1}" for index, title in others]
-        more = f" and {len(titles) - 8} more" if len(titles) > 8 else ""
+        shown = [_shortened(title) if title else f"column {index + 1}" for index, title in others]
+        more = f" and {len(shown) - 8} more" if len(shown) > 8 else ""
         warnings.append(
-            f"Columns that are no channels were left out: {', '.join(titles[:8])}{more}."
+            f"Columns that are no channels were left out: {', '.join(shown[:8])}{more}."
         )
     return sorted(found.values(), key=lambda column: column.info.name != "time"), warnings
 
 
-def _column(index: int, info: ChannelInfo, unit: str, source: str) -> _Column:
+def _column(index: int, info: ChannelInfo, unit: str, source: str) -> Chosen:
     try:
         factor, offset = to_si(unit or info.unit, info.unit)
     except UnitError as error:
@@ -176,22 +242,26 @@ def _column(index: int, info: ChannelInfo, unit: str, source: str) -> _Column:
             f"{source}: column {index + 1}, {info.name}: {error}; write a unit of {info.quantity}"
             f" such as {info.name} [{info.display_unit}]."
         ) from error
-    return _Column(index, info, unit, factor, offset)
+    return Chosen(index, info, unit, factor, offset)
 
 
-def _require_channels(header: list[str], found: Collection[str], source: str) -> None:
-    """Refuse a header without time or without any channel."""
-    if "time" not in found:
-        listed = ", ".join(_shortened(title) for title in header[:5])
+def _require_channels(table: Table, found: Collection[str]) -> None:
+    """Refuse a file without time or without any channel."""
+    if table.kind == CSV and "time" not in found:
+        listed = ", ".join(_shortened(_titled(*title)) for title in table.titles()[:5])
         raise MeasurementError(
-            f"{source}: no column is called time (the first line reads: {listed}); name the"
+            f"{table.source}: no column is called time (the first line reads: {listed}); name the"
             " columns on the first line, such as time [s],chassis.z [mm]."
         )
-    if len(found) == 1:
+    if not set(found) - {"time"}:
         raise MeasurementError(
-            f"{source}: no column besides time is a known channel; name them like"
+            f"{table.source}: no column besides time is a known channel; name them like"
             " chassis.z [mm],wheel.fl.z [mm]."
         )
+
+
+def _titled(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name
 
 
 def _refuse_misspelling(index: int, title: str, found: Collection[str], source: str) -> None:
@@ -232,14 +302,16 @@ def _shortened(title: str) -> str:
     return title if len(title) <= 40 else f"{title[:37]}..."
 
 
-def _require_increasing(time: NDArray[np.float64], table: CsvTable, source: str) -> None:
+def _require_increasing(time: NDArray[np.float64], table: Table) -> None:
     backwards = np.flatnonzero(np.diff(time) <= 0.0)
     if backwards.size:
         row = int(backwards[0]) + 1
+        place = table.place(row)
+        noun = place.split()[0]
         raise MeasurementError(
-            f"{source}: line {table.line_of(row)}: time {time[row]:.10g} s does not come after"
-            f" {time[row - 1]:.10g} s of the line before; sort the lines by time and keep one for"
-            " each time."
+            f"{table.source}: {place}: time {time[row]:.10g} s does not come after"
+            f" {time[row - 1]:.10g} s of the {noun} before; sort the {noun}s by time and keep one"
+            " for each time."
         )
 
 
@@ -251,7 +323,7 @@ def _doubtful_time(time: NDArray[np.float64]) -> list[str]:
 
 
 def _doubtful_magnitude(
-    column: _Column, time: NDArray[np.float64], values: NDArray[np.float64]
+    column: Chosen, time: NDArray[np.float64], values: NDArray[np.float64]
 ) -> list[str]:
     """A warning when a channel's greatest value makes its stated unit, or itself, doubtful."""
     info = column.info

@@ -11,6 +11,7 @@ Other keys are for other readers, such as the vehicle that was driven.
 """
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -20,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .channels import Run, channel
+from .channels import Run, channel, find_channel
 from .errors import MeasurementError
 from .step_record import StepRecord, step_record_to_json, step_records_from_json
 from .toml_text import LARGEST_FILE, parse_toml, toml_table, toml_value
@@ -37,6 +38,10 @@ LOUDEST = 3
 
 SHARE_OF_LARGEST = 0.01
 """... if it also exceeds this share of the greatest value of a real recording."""
+
+_NOISE_LINE = re.compile(
+    r"^noise of (\S+): (\d+(?:\.\d+)?(?:[eE][+-]?\d+)?) (.+?)\s*$", re.MULTILINE
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +104,17 @@ def notes_of(run: Run) -> str:
             if name not in lists:
                 lines += toml_table(f"[conditioning.{name}]", one)
     return "\n".join([*lines, ""])
+
+
+def notes_in(comment: str) -> RunNotes:
+    """The notes that a recording of ours carries in its own header, one a line; see `mdf4`."""
+    description = re.search(r"^description: (.*)$", comment, re.MULTILINE)
+    noise = {}
+    for name, value, unit in _NOISE_LINE.findall(comment):
+        info = find_channel(name)
+        if info is not None and info.unit == unit:
+            noise[name] = float(value)
+    return RunNotes(noise, description[1].strip() if description else "")
 
 
 def checked_noise(noise: Mapping[str, Any], source: str) -> dict[str, float]:

@@ -9,8 +9,8 @@ from pathlib import Path
 from ...engine.campaign import CAMPAIGN, Campaign, Recording, roughened
 from ...engine.campaign_run import CampaignProgress, drive
 from ...engine.errors import CampaignError
+from ...engine.formats.readers import require_package
 from ...engine.manoeuvre import Manoeuvre
-from ...engine.mdf4 import require_asammdf
 from ...engine.plant import Plant
 from ...engine.recording_files import files_of, files_of_car, names_of
 from ...engine.sensor_file import noisy, read_sensors
@@ -26,7 +26,7 @@ def campaign(options: Namespace) -> None:
     """Drive a car through the manoeuvres and write each recording as it is made."""
     planned, date = _plan(options), _date(options.date)
     if options.form == "mf4":
-        require_asammdf()
+        require_package("MDF4")
     folder = make_folder(options.output)
     require_writable(folder)
     names = names_of(planned.manoeuvres, options.form)

@@ -157,7 +157,7 @@ def test_a_file_of_sensors_that_cannot_be_used_is_refused(client, data, said):
 def test_the_formats_of_recordings_are_listed(client, monkeypatch):
     listed = client.get("/api/formats").json()
     assert [(one["key"], one["missing"]) for one in listed] == [("csv", ""), ("mf4", "")]
-    monkeypatch.setattr("ridetune.engine.mdf4.find_spec", lambda name: None)
+    monkeypatch.setattr("ridetune.engine.formats.readers.find_spec", lambda name: None)
     assert client.get("/api/formats").json()[1]["missing"].endswith("or take CSV.")
 
 

@@ -4,9 +4,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import ridetune.sample_runs
-from ridetune.engine import measurement
 from ridetune.engine.channels import CHANNELS, Run
 from ridetune.engine.errors import MeasurementError
+from ridetune.engine.formats import opening
 from ridetune.engine.measurement import (
     missing_for_identification,
     parse_run,
@@ -262,7 +262,7 @@ def test_two_samples_are_too_few():
 
 
 def test_a_file_too_large_is_refused_unread(monkeypatch):
-    monkeypatch.setattr(measurement, "LARGEST_FILE", 100)
+    monkeypatch.setattr(opening, "LARGEST_FILE", 100)
     assert "run.csv: the file has 0 MB, more than 0 MB; cut" in refusal(small("chassis.z [m]"))
 
 

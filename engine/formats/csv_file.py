@@ -1,0 +1,53 @@
+"""CSV and other text as a table: the columns are titled `name [unit]`, or carry a row of units."""
+
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import BinaryIO
+
+from ..csv_table import CsvTable, split_title
+from .listing import nearest_clocks
+from .table import Array, Column, Table
+
+
+class CsvFile(Table):
+    """A text file; its samples are only counted when `columns` is asked for."""
+
+    kind = "CSV"
+    comment = ""
+    warnings = ()
+
+    def __init__(self, stream: BinaryIO, source: str):
+        self.source = source
+        self._table = CsvTable(stream, source)
+
+    @classmethod
+    def at(cls, path: Path, source: str, kind: str) -> "CsvFile":
+        """Open the file at a path; it stays open as long as the table."""
+        return cls(path.open("rb"), source)
+
+    def titles(self) -> tuple[tuple[str, str], ...]:
+        """Name and unit of every column."""
+        return tuple(map(split_title, self._table.header))
+
+    @cached_property
+    def columns(self) -> tuple[Column, ...]:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Every column of the header."""
+        samples, titles = self._table.count(), self.titles()
+        clocks = nearest_clocks([((name,), samples) for name, _ in titles])
+        return tuple(
+            Column(name, unit, samples, clock=clock)
+            for (name, unit), clock in zip(titles, clocks, strict=True)
+        )
+
+    def values(self, index: int) -> Array:
+        """The numbers of one column; NaN for an empty cell."""
+        return self._table.with_gaps(index)
+
+    def place(self, row: int) -> str:
+        """The line that holds a sample."""
+        return f"line {self._table.line_of(row)}"
+
+    def in_si(self, columns: Sequence[tuple[int, float, float]]) -> Array:
+        """Numbers (samples, len(columns)) as factor * number + offset, all finite."""
+        return self._table.in_si(columns)

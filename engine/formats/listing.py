@@ -1,0 +1,127 @@
+"""The columns of a file as a reader finds them, within limits, and what it leaves out."""
+
+import re
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..errors import MeasurementError
+from .table import MOST_NUMBERS, Array, Column
+
+MOST_COLUMNS = 50_000
+"""Most columns a file may have."""
+
+MOST_SAMPLES = MOST_NUMBERS
+"""Most samples of one column."""
+
+WIDEST = 64
+"""Most columns one array of two dimensions is taken for."""
+
+LONGEST_TEXT = 200
+"""Longest name, unit or comment that is kept, characters."""
+
+_TIME = re.compile(r"(time|t|zeit|temps|timestamps?|time_?s(ec)?|abtastzeit)", re.IGNORECASE)
+_SHOWN = 5
+
+
+class Listing:
+    """Columns with the places their numbers are read from."""
+
+    def __init__(self, source: str, kind: str):
+        self._source, self._kind = source, kind
+        self._columns: list[Column] = []
+        self._left: dict[str, list[str]] = {}
+        self.places: list[Any] = []
+
+    def add(self, column: Column, place: Any) -> int | None:
+        """Take a column and where its numbers are; its index, or None where it is left out."""
+        if len(self._columns) == MOST_COLUMNS:
+            raise MeasurementError(
+                f"{self._source}: the file has more than {MOST_COLUMNS} columns; export fewer."
+            )
+        if column.samples <= 0:
+            return self.leave_out(column.name, "holds no samples")
+        if column.samples > MOST_SAMPLES:
+            return self.leave_out(column.name, f"declares more than {MOST_SAMPLES} samples")
+        self._columns.append(column)
+        self.places.append(place)
+        return len(self._columns) - 1
+
+    def leave_out(self, name: str, why: str) -> None:
+        """Note what is not taken for a column, and why."""
+        self._left.setdefault(why, []).append(plain(name))
+
+    def columns(self) -> tuple[Column, ...]:
+        """All that was found; refused when nothing was."""
+        if not self._columns:
+            reasons = "; ".join(self._reasons()) or "it holds no numbers"
+            raise MeasurementError(
+                f"{self._source}: this {self._kind} file has no column of numbers that can be"
+                f" read: {reasons}; export the recording again as plain numbers over time."
+            )
+        return tuple(self._columns)
+
+    def warnings(self) -> tuple[str, ...]:
+        """One sentence a reason."""
+        return tuple(f"Left out was what cannot be read: {reason}." for reason in self._reasons())
+
+    def _reasons(self) -> list[str]:
+        return [f"{_named(names)} {why}" for why, names in self._left.items()]
+
+
+def _named(names: Sequence[str]) -> str:
+    shown = ", ".join(name or "a column without a name" for name in names[:_SHOWN])
+    return shown + (f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else "")
+
+
+def plain(text: Any) -> str:
+    """A text of a file without control characters, on one line, of bounded length."""
+    if isinstance(text, bytes):
+        text = text[: 4 * LONGEST_TEXT].decode("utf-8", "replace")
+    kept = str(text)[: 4 * LONGEST_TEXT]
+    kept = re.sub(r"[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]+", " ", kept)
+    return kept.strip()[:LONGEST_TEXT]
+
+
+def means_time(name: str) -> bool:
+    """Whether a column's name says that it is the time."""
+    return bool(_TIME.fullmatch(name.strip()))
+
+
+def nearest_clocks(found: Sequence[tuple[tuple[str, ...], int]]) -> list[int | None]:
+    """For each column the index of its time: named so, of its length, in its group or above.
+
+    found : path of groups and name, and number of samples, of each column
+    """
+    times: dict[tuple[tuple[str, ...], int], int] = {}
+    for index, (path, samples) in enumerate(found):
+        if means_time(path[-1]):
+            times.setdefault((path[:-1], samples), index)
+    clocks = []
+    for index, (path, samples) in enumerate(found):
+        above = (times.get((path[:depth], samples)) for depth in range(len(path) - 1, -1, -1))
+        clock = next((one for one in above if one is not None), None)
+        clocks.append(None if clock == index or means_time(path[-1]) else clock)
+    return clocks
+
+
+def numbers(values: Any) -> Array:
+    """An array of any kind of number as float64 (n,); seconds from its first for dates."""
+    values = np.asarray(values).reshape(-1)
+    if values.dtype.kind == "M":
+        values = values - values[:1]
+    if values.dtype.kind == "m":
+        seconds = values.astype("timedelta64[ns]").astype(np.float64) * 1e-9
+        return np.where(np.isnat(values), np.nan, seconds)
+    return np.ascontiguousarray(values, dtype=np.float64)
+
+
+def first_text(*texts: Any) -> str:
+    """The first of some texts that says anything."""
+    return next((said for text in texts if (said := plain(text if text is not None else ""))), "")
+
+
+def matrix_columns(name: str, width: int) -> Iterable[str]:
+    """Names of the columns that one array is taken for."""
+    return [name] if width == 1 else [f"{name}({k + 1})" for k in range(width)]

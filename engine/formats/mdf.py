@@ -1,0 +1,106 @@
+"""MDF 3 and MDF 4 (ASAM), by asammdf: loggers and calibration tools.
+
+Each group of channels has its clock, the master channel, in s. Conversions to physical values are
+asammdf's. Channels of text, bytes and arrays are left out. Invalid samples become NaN.
+"""
+
+import html
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .listing import MOST_SAMPLES, Listing, first_text, numbers, plain
+from .table import Array, Column, Table
+
+_TEXT_CONVERSIONS = {3: {11, 12}, 4: {7, 8, 9, 10}}
+"""Types of conversion, by version, whose physical value is a text."""
+
+_TX = re.compile(r"<TX[^>]*>(.*?)</TX>", re.DOTALL)
+
+_PLAIN_DATA = {3: {0, 1, 2, 3, 9, 10, 11, 13, 14, 15, 16}, 4: {0, 1, 2, 3, 4, 5}}
+"""Types of data, by version, that are whole numbers or floats."""
+
+
+class MdfFile(Table):
+    """An MDF file of either version."""
+
+    def __init__(self, path: Path, source: str, kind: str):
+        from asammdf import MDF
+
+        self.source, self.kind = source, kind
+        self._file: Any = MDF(path)
+        self._version = 3 if kind == "MDF3" else 4
+        listing = Listing(source, kind)
+        for number in range(len(self._file.groups)):
+            self._list(listing, number)
+        self.columns, self.warnings = listing.columns(), listing.warnings()
+        self._places: list[tuple[int, int]] = listing.places
+        self.comment = _text(self._file.header.comment)
+
+    def _list(self, listing: Listing, number: int) -> None:
+        group = self._file.groups[number]
+        samples = int(group.channel_group.cycles_nr)
+        named = first_text(
+            getattr(group.channel_group, "acq_name", ""), _text(group.channel_group.comment)
+        )
+        label = named or f"group {number + 1}"
+        if samples == 0:
+            return
+        master, clock = self._file.masters_db.get(number), None
+        if master is not None and self._is_time(group.channels[master]):
+            clock = listing.add(
+                Column(plain(group.channels[master].name), "s", samples, label), (number, master)
+            )
+        for index, channel in enumerate(group.channels):
+            if index == master and clock is not None:
+                continue
+            name = plain(channel.name)
+            if self._is_text(channel):
+                listing.leave_out(name, "holds no plain numbers")
+                continue
+            conversion = channel.conversion
+            unit = first_text(conversion.unit if conversion else "", channel.unit)
+            column = Column(
+                name, unit, samples, label, clock=clock, comment=plain(_text(channel.comment))
+            )
+            listing.add(column, (number, index))
+
+    def _is_time(self, channel: Any) -> bool:
+        return self._version == 3 or channel.sync_type == 1
+
+    def _is_text(self, channel: Any) -> bool:
+        conversion = channel.conversion
+        return (
+            channel.data_type not in _PLAIN_DATA[self._version]
+            or (conversion and conversion.conversion_type in _TEXT_CONVERSIONS[self._version])
+            or getattr(channel, "component_addr", 0) != 0
+        )
+
+    def values(self, index: int) -> Array:
+        """Physical values of one channel."""
+        return self.part(index, 0, self.columns[index].samples)
+
+    def part(self, index: int, begin: int, count: int) -> Array:
+        """Some samples of one channel; only the blocks that hold them are read."""
+        group, channel = self._places[index]
+        count = min(count, self.columns[index].samples - begin, MOST_SAMPLES)
+        samples, invalid = self._file.get(
+            group=group,
+            index=channel,
+            samples_only=True,
+            record_offset=begin,
+            record_count=count,
+            ignore_invalidation_bits=False,
+        )
+        values = numbers(samples)
+        if invalid is not None and len(invalid) == len(values):
+            values[np.asarray(invalid, dtype=bool)] = np.nan
+        return values
+
+
+def _text(comment: str | None) -> str:
+    """A comment's own text, which MDF 4 may keep in XML."""
+    found = _TX.search(comment or "")
+    return html.unescape(found[1]) if found else comment or ""

@@ -1,0 +1,69 @@
+"""Parquet, by pyarrow: pandas, polars, Spark and MATLAB's parquetwrite.
+
+The unit is the field's metadata unit or units, or stands in brackets in its title. Dates count in
+s from the first.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..csv_table import split_title
+from .listing import Listing, first_text, nearest_clocks, numbers, plain
+from .table import Array, Column, Table
+
+
+class ParquetTable(Table):
+    """A Parquet file, read column by column."""
+
+    def __init__(self, path: Path, source: str, kind: str):
+        import pyarrow as pa
+        from pyarrow import parquet
+
+        self._pa = pa
+        self.source, self.kind, self.comment = source, kind, ""
+        self._file: Any = parquet.ParquetFile(
+            path,
+            memory_map=False,
+            thrift_string_size_limit=50_000_000,
+            thrift_container_size_limit=1_000_000,
+        )
+        samples, listing = int(self._file.metadata.num_rows), Listing(source, kind)
+        fields = {field.name: field for field in self._file.schema_arrow}
+        taken: list[tuple[str, str, int]] = []
+        for leaf in range(self._file.metadata.num_columns):
+            described = self._file.schema.column(leaf)
+            field = fields.get(described.path)
+            if field is None or not _is_number(pa, field.type):
+                listing.leave_out(described.path, "holds no plain numbers")
+                continue
+            name, unit = split_title(plain(field.name))
+            stated = field.metadata or {}
+            unit = first_text(stated.get(b"unit"), stated.get(b"units"), unit)
+            taken.append((name, "s" if pa.types.is_temporal(field.type) else unit, leaf))
+        clocks = nearest_clocks([((name,), samples) for name, _, _ in taken])
+        for (name, unit, leaf), clock in zip(taken, clocks, strict=True):
+            listing.add(Column(name, unit, samples, clock=clock), leaf)
+        self.columns, self.warnings = listing.columns(), listing.warnings()
+        self._leaves = listing.places
+
+    def values(self, index: int) -> Array:
+        """The numbers of one column; NaN for what is null."""
+        column = self._file.reader.read_column(self._leaves[index])
+        if self._pa.types.is_decimal(column.type):
+            column = column.cast(self._pa.float64())
+        return numbers(
+            np.concatenate([chunk.to_numpy(zero_copy_only=False) for chunk in column.chunks])
+        )
+
+
+def _is_number(pa: Any, kind: Any) -> bool:
+    types = pa.types
+    return (
+        types.is_integer(kind)
+        or types.is_floating(kind)
+        or types.is_decimal(kind)
+        or types.is_timestamp(kind)
+        or types.is_duration(kind)
+    )

@@ -1,0 +1,80 @@
+"""TDMS (National Instruments), by npTDMS: LabVIEW and DAQmx.
+
+The unit is the channel's unit_string, the time its wf_increment and wf_start_offset or, where the
+channel has none, the channel of its group called time. Scaling is the file's, done by npTDMS.
+"""
+
+import math
+from pathlib import Path
+from typing import Any
+
+from .listing import Listing, first_text, nearest_clocks, numbers, plain
+from .table import Array, Column, Table
+
+MOST_SEGMENT_SHARE = 64
+"""Samples a byte of the file may stand for at most: a repeated index is short, its data are not."""
+
+
+class TdmsTable(Table):
+    """A TDMS file, read channel by channel."""
+
+    def __init__(self, path: Path, source: str, kind: str):
+        from nptdms import TdmsFile
+
+        self.source, self.kind, self.comment = source, kind, ""
+        file = TdmsFile.open(str(path))
+        listing, size = Listing(source, kind), path.stat().st_size
+        channels = [channel for group in file.groups() for channel in group.channels()]
+        taken = []
+        for channel in channels:
+            if channel.data_type is None or len(channel) == 0:
+                listing.leave_out(channel.name, "holds no samples")
+            elif channel.dtype.kind not in "iufbM":
+                listing.leave_out(channel.name, "holds no plain numbers")
+            elif len(channel) > size * MOST_SEGMENT_SHARE:
+                listing.leave_out(channel.name, "declares more samples than the file holds")
+            else:
+                taken.append(channel)
+        clocks = nearest_clocks(
+            [((plain(one.group_name), plain(one.name)), len(one)) for one in taken]
+        )
+        for channel, clock in zip(taken, clocks, strict=True):
+            start, step = _waveform(channel.properties)
+            column = Column(
+                plain(channel.name),
+                _unit(channel),
+                len(channel),
+                plain(channel.group_name),
+                clock=None if step is not None else clock,
+                start=start,
+                step=step,
+                comment=first_text(channel.properties.get("description")),
+            )
+            listing.add(column, channel)
+        self.columns, self.warnings = listing.columns(), listing.warnings()
+        self._channels = listing.places
+
+    def values(self, index: int) -> Array:
+        """Scaled values of one channel."""
+        return numbers(self._channels[index].read_data(scaled=True))
+
+    def part(self, index: int, begin: int, count: int) -> Array:
+        """Some scaled values of one channel."""
+        return numbers(self._channels[index].read_data(offset=begin, length=count, scaled=True))
+
+
+def _waveform(properties: Any) -> tuple[float, float | None]:
+    """First time and step, s, where a channel states them."""
+    try:
+        step = float(properties["wf_increment"])
+        start = float(properties.get("wf_start_offset", 0.0))
+    except (KeyError, TypeError, ValueError):
+        return 0.0, None
+    return (start, step) if math.isfinite(start) and 0.0 < step < math.inf else (0.0, None)
+
+
+def _unit(channel: Any) -> str:
+    if channel.dtype.kind == "M":
+        return "s"
+    properties = channel.properties
+    return first_text(properties.get("unit_string"), properties.get("NI_UnitDescription"))

@@ -1,0 +1,105 @@
+"""UFF58, ASCII and binary, by pyuff: functions of time, one a data set.
+
+The name is the first line of the data set's description or its response node and direction, the
+unit that of the ordinate's axis. Spectra and complex functions are left out, by name.
+"""
+
+import math
+from pathlib import Path
+from typing import Any
+
+from ..errors import MeasurementError
+from .listing import Listing, first_text, numbers, plain
+from .table import Array, Column, Table
+
+LARGEST = 400_000_000
+"""Longest UFF file, bytes; it is searched as a whole."""
+
+_TIME, _FREQUENCY = 17, 18
+_SPECTRA = frozenset((2, 3, 4, 6, 9, 10, 12, 13))
+"""Cross, auto and power spectra, frequency responses, coherences, transfer functions, ..."""
+
+_DIRECTIONS = {1: "+X", -1: "-X", 2: "+Y", -2: "-Y", 3: "+Z", -3: "-Z", 0: ""}
+_SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
+
+
+class UffFile(Table):
+    """A universal file with data sets 58."""
+
+    def __init__(self, path: Path, source: str, kind: str):
+        import pyuff
+
+        self.source, self.kind, self.comment = source, kind, ""
+        if path.stat().st_size > LARGEST:
+            raise MeasurementError(
+                f"{source}: a UFF file of more than {LARGEST / 1e6:.0f} MB is not read; export it"
+                " in parts."
+            )
+        self._file: Any = pyuff.UFF(str(path))
+        self._held: tuple[int, Any] = (-1, None)
+        listing = Listing(source, kind)
+        sets = [k for k, form in enumerate(self._file.get_set_types()) if form == 58]
+        for k in sets:
+            self._list(listing, k, self._file.read_sets(k, header_only=True))
+        if not sets:
+            listing.leave_out("the file", "holds no data set 58")
+        self.columns, self.warnings = listing.columns(), listing.warnings()
+        self._places = listing.places
+
+    def _list(self, listing: Listing, k: int, head: Any) -> None:
+        name = _name(head) or f"data set {k + 1}"
+        form, abscissa = head["func_type"], head["abscissa_spec_data_type"]
+        if form in _SPECTRA or abscissa == _FREQUENCY:
+            listing.leave_out(name, "is a spectrum, not a time history")
+        elif head["ord_data_type"] in (5, 6):
+            listing.leave_out(name, "is complex, not a time history")
+        elif form not in (0, 1) and abscissa != _TIME:
+            listing.leave_out(name, "is no time history")
+        else:
+            self._add(listing, k, name, head)
+
+    def _add(self, listing: Listing, k: int, name: str, head: Any) -> None:
+        unit = _label(head["ordinate_axis_units_lab"])
+        shown, samples = _label(head["abscissa_axis_units_lab"]), int(head["num_pts"])
+        comment = first_text(_label(head["id2"]), _label(head["id3"]))
+        group = f"data set {k + 1}"
+        if head["abscissa_spacing"] == 1:
+            second = _SECONDS.get(shown.lower())
+            start, step = float(head["abscissa_min"]), float(head["abscissa_inc"])
+            if second is None or not (math.isfinite(start) and 0.0 < step < math.inf):
+                listing.leave_out(name, "has no time in seconds")
+                return
+            column = Column(
+                name, unit, samples, group, None, second * start, second * step, comment
+            )
+        else:
+            clock = listing.add(Column("time", shown or "s", samples, group), (k, "x"))
+            column = Column(name, unit, samples, group, clock, comment=comment)
+        listing.add(column, (k, "data"))
+
+    def values(self, index: int) -> Array:
+        """The ordinate of one data set, or its abscissa."""
+        k, part = self._places[index]
+        if self._held[0] != k:
+            self._held = (k, self._file.read_sets(k))
+        values, declared = numbers(self._held[1][part]), self.columns[index].samples
+        if len(values) < declared:
+            raise MeasurementError(
+                f"{self.source}: {self.columns[index].group} holds {len(values)} samples but"
+                f" declares {declared}; it is cut short, so export it again."
+            )
+        return values[:declared]
+
+
+def _label(text: Any) -> str:
+    said = plain(text)
+    return "" if said.upper() in ("NONE", "UNKNOWN", "NONE NONE") else said
+
+
+def _name(head: Any) -> str:
+    described = _label(head["id1"])
+    if described:
+        return described
+    direction = _DIRECTIONS.get(head["rsp_dir"], "")
+    place = f"{head['rsp_node']}{direction}" if head["rsp_node"] or direction else ""
+    return " ".join(part for part in (_label(head["rsp_ent_name"]), place) if part)
