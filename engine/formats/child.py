@@ -32,6 +32,9 @@ from .table import Array, Column, Table
 LONGEST_SENTENCE = 2000
 """Longest sentence that is believed to be one, characters."""
 
+COMMAND = f"from {__package__}.answers import main; main()"
+"""What the child runs."""
+
 WRITTEN = 1 << 20
 """Longest file a child may write, bytes: asammdf begins one, in the folder that goes with it."""
 
@@ -92,7 +95,6 @@ class ChildTable(Table):
             raise
 
     def _started(self, theirs: socket.socket) -> subprocess.Popen[bytes]:
-        command = f"from {__package__}.answers import main; main()"
         threads = ("OPENBLAS", "OMP", "MKL", "NUMEXPR", "NUMEXPR_MAX")
         environment = {
             "HOME": self._folder,
@@ -107,7 +109,7 @@ class ChildTable(Table):
         }
         arguments = [str(theirs.fileno()), json.dumps(self._limits)]
         return subprocess.Popen(
-            [sys.executable, "-I", "-B", "-c", command, *arguments],
+            [sys.executable, "-I", "-B", "-c", COMMAND, *arguments],
             cwd=self._folder,
             env=environment,
             stdin=subprocess.DEVNULL,

@@ -6,6 +6,7 @@ structure of Time and Data, as a time series is exported, is one column. Names a
 Objects, functions and cells are left out.
 """
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -22,16 +23,20 @@ from .listing import (
     numbers,
     plain,
 )
+from .mat5_heads import Head, heads
 from .table import Array, Column, Table
 
 DEEPEST = 8
 """Most structures within each other."""
 
+MOST_RECORDS = 1000
+"""Most elements of an array of structures."""
+
 LARGEST = 1_000_000_000
 """Longest MAT 5 file, bytes; a variable is read as a whole."""
 
 _NUMERIC = frozenset(
-    ("double", "single", "logical")
+    ("double", "single")
     + tuple(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))
 )
 _REASONS = {
@@ -49,8 +54,6 @@ class Mat5File(Table):
     """A MAT file of version 5; vectors on their own are only read when asked for."""
 
     def __init__(self, path: Path, source: str, kind: str):
-        from scipy.io import whosmat
-
         self.source, self.kind, self.comment = source, kind, ""
         self._path = path
         if path.stat().st_size > LARGEST:
@@ -60,8 +63,9 @@ class Mat5File(Table):
             )
         self._listing = Listing(source, kind)
         self._found: list[tuple[tuple[str, ...], Column, Any]] = []
-        for name, shape, form in whosmat(str(path)):
-            self._variable(name, tuple(shape), form)
+        with path.open("rb") as stream:
+            for head in heads(stream):
+                self._variable(head)
         clocks = nearest_clocks([(path, column.samples) for path, column, _ in self._found])
         for (_, column, place), clock in zip(self._found, clocks, strict=True):
             taken = Column(column.name, column.unit, column.samples, column.group, clock=clock)
@@ -70,16 +74,23 @@ class Mat5File(Table):
         self._places = self._listing.places
         self._held: tuple[str, Any] = ("", None)
 
-    def _variable(self, name: str, shape: tuple[int, ...], form: str) -> None:
-        if form in _NUMERIC:
-            self._array(((name),), name, shape, "", None)
-        elif form == "struct":
-            if int(np.prod(shape, dtype=object)) > MOST_SAMPLES:
-                self._listing.leave_out(name, "is a structure of too many elements")
-            else:
-                self._struct((plain(name),), self._load(name), 1)
+    def _variable(self, head: Head) -> None:
+        name, shape = head.name, head.shape
+        if not name:
+            return  # MATLAB's own bookkeeping of objects
+        elements = math.prod(shape)
+        if min(shape, default=0) < 0 or elements > WIDEST * MOST_SAMPLES:
+            self._listing.leave_out(name, f"declares more than {MOST_SAMPLES} samples")
+        elif head.complex:
+            self._listing.leave_out(name, "is complex")
+        elif head.form in _NUMERIC:
+            self._array((plain(name),), name, shape, "", None)
+        elif head.form == "struct" and elements > MOST_RECORDS:
+            self._listing.leave_out(name, "is a structure of too many elements")
+        elif head.form == "struct":
+            self._struct((plain(name),), self._load(name), 1)
         else:
-            self._listing.leave_out(name, _REASONS.get(form, "holds no plain numbers"))
+            self._listing.leave_out(name, _REASONS.get(head.form, "holds no plain numbers"))
 
     def _load(self, name: str) -> Any:
         from scipy.io import loadmat
@@ -107,7 +118,7 @@ class Mat5File(Table):
         for k, title in enumerate(matrix_columns(plain(name), width)):
             own = path if width == 1 else (*path[:-1], title)
             column = Column(title, unit, shape[along], ".".join(path[:-1]))
-            self._found.append((own, column, (path[0] if data is None else data, along, k)))
+            self._found.append((own, column, (name if data is None else data, along, k)))
 
     def _struct(self, path: tuple[str, ...], records: Any, depth: int) -> None:
         """List what a structure, or an array of them, holds."""
@@ -115,7 +126,7 @@ class Mat5File(Table):
             self._listing.leave_out(".".join(path), "lies beyond what is searched")
             return
         several = records.size > 1
-        for number, record in enumerate(records.reshape(-1)[:1000]):
+        for number, record in enumerate(records.reshape(-1)):
             here = (*path[:-1], f"{path[-1]}({number + 1})") if several else path
             fields = {plain(name): record[name] for name in records.dtype.names}
             unit = first_text(*(_text(fields.get(key)) for key in _UNITS), _data_unit(fields))

@@ -1,0 +1,133 @@
+"""Every kind of file gives back what its own library was given.
+
+Oracle: the numbers, names and units that were written; the library's own reader where it has one.
+"""
+
+from datetime import UTC, datetime
+
+import cmerg
+import numpy as np
+import pytest
+from asammdf import MDF, Signal
+from numpy.testing import assert_allclose
+from ridetune.engine.channels import Run
+from ridetune.engine.errors import MeasurementError
+from ridetune.engine.formats.child import ChildTable
+from ridetune.engine.formats.kinds import kind_of
+from ridetune.engine.formats.table import time_of
+from ridetune.engine.mdf4 import run_to_mdf4
+from ridetune.engine.measurement import read_run
+
+from tests import files_of_kinds as files
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    made = tmp_path_factory.mktemp("kinds")
+    for name, (write, _, _) in files.WRITERS.items():
+        write(made / name)
+    return made
+
+
+@pytest.mark.parametrize("name", files.WRITERS)
+def test_columns_units_and_times_come_back(folder, name):
+    _, kind, off = files.WRITERS[name]
+    with ChildTable(folder / name, name) as table:
+        assert table.kind == kind
+        for channel, (values, unit) in files.CHANNELS.items():
+            index = [column.name for column in table.columns].index(channel)
+            column = table.columns[index]
+            assert (column.unit, column.samples) == (unit, len(values))
+            assert_allclose(table.values(index), values, rtol=0, atol=off)
+            # Some forms keep the first time and the step, others five digits of every time.
+            assert_allclose(time_of(table, index), files.TIME, rtol=1e-5, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", ["r.csv", "r.mf4", "r.mat", "r73.mat", "r.rsp", "r.zip"])
+def test_a_file_titled_like_our_channels_is_a_run(folder, name):
+    *_, off = files.WRITERS[name]
+    run = read_run(folder / name)
+    assert run.warnings == ()
+    assert run.columns == ["chassis.z", "chassis.a_x"]
+    # mm become m, which may round once more.
+    assert_allclose(run["chassis.z"], 1e-3 * files.Z, rtol=1e-15, atol=1e-3 * off)
+    assert_allclose(run["chassis.a_x"], files.A_X, rtol=1e-15, atol=off)
+
+
+@pytest.mark.parametrize("name", ["r.mf4", "r.tdms", "r.csv"])
+def test_the_content_tells_the_kind_and_not_the_name(folder, tmp_path, name):
+    other = tmp_path / "recording.dat"
+    other.write_bytes((folder / name).read_bytes())
+    with other.open("rb") as stream:
+        assert kind_of(stream, other.name) == files.WRITERS[name][1]
+
+
+def test_a_carmaker_recording_reads_as_cmerg_reads_it(folder):
+    """Oracle: cmerg."""
+    theirs = cmerg.ERG(str(folder / "r.erg"))
+    with ChildTable(folder / "r.erg", "r.erg") as table:
+        for index, column in enumerate(table.columns):
+            assert_allclose(table.values(index), theirs.signals[column.name].data)
+
+
+def test_a_carmaker_recording_without_its_description_is_refused(folder, tmp_path):
+    (tmp_path / "r.erg").write_bytes((folder / "r.erg").read_bytes())
+    with pytest.raises(MeasurementError, match=r"keep r\.erg\.info beside it, or pack the two"):
+        read_run(tmp_path / "r.erg")
+
+
+@pytest.mark.parametrize("name", ["r.h5", "r.tdms", "r.mf4"])
+def test_an_envelope_holds_the_extremes_of_its_stretches(folder, name):
+    """Oracle: the extremes of the numbers themselves, five samples a stretch."""
+    with ChildTable(folder / name, name) as table:
+        index = [column.name for column in table.columns].index("chassis.z")
+        found = table.envelope(index, 10)
+    stretches = files.Z.reshape(10, 5)
+    assert_allclose(found.minimum, stretches.min(axis=1))
+    assert_allclose(found.maximum, stretches.max(axis=1))
+    assert_allclose(found.time, files.TIME[::5], atol=1e-15)
+
+
+def test_noise_and_description_of_our_own_mdf4_come_back(tmp_path):
+    run = Run("r", files.TIME, {"chassis.z": 1e-3 * files.Z}, {"chassis.z": 4e-5})
+    facts = {"description": "wet road", "vehicle": "car", "manoeuvre": "m.json", "plant": "8dof"}
+    (tmp_path / "r.mf4").write_bytes(
+        run_to_mdf4(run, {"chassis.z": "mm"}, facts, datetime.now(UTC))
+    )
+    found = read_run(tmp_path / "r.mf4")
+    assert (found.noise, found.description) == ({"chassis.z": 4e-5}, "wet road")
+    assert_allclose(found["chassis.z"], run["chassis.z"], rtol=1e-15)
+    (tmp_path / "r.toml").write_text('[noise]\n"chassis.z" = 1e-4\n')
+    assert read_run(tmp_path / "r.mf4").noise == {"chassis.z": 1e-4}
+
+
+def of_two_clocks(path, steps, begins=(0.0, 0.0), seconds=1.0):
+    with MDF(version="4.10") as file:
+        for name, step, begin in zip(("chassis.z", "chassis.a_x"), steps, begins, strict=True):
+            time = begin + step * np.arange(int(seconds / step) + 1)
+            file.append([Signal(0.01 * time, time, name=name)], common_timebase=True)
+        file.save(path, overwrite=True)
+    return path
+
+
+def test_a_coarser_clock_is_interpolated_onto_the_finest(tmp_path):
+    """Oracle: a straight line, which linear interpolation keeps."""
+    run = read_run(of_two_clocks(tmp_path / "r.mf4", (0.01, 0.03), seconds=0.9))
+    assert_allclose(run["chassis.a_x"], 0.01 * run.time, atol=1e-15)
+    assert any("chassis.a_x, sampled every 0.03 s by another clock" in w for w in run.warnings)
+
+
+def test_the_run_is_cut_to_what_its_clocks_share(tmp_path):
+    run = read_run(of_two_clocks(tmp_path / "r.mf4", (0.01, 0.01), (0.0, 0.205)))
+    assert 0.205 <= run.time[0] < 0.215
+    assert run.time[-1] == pytest.approx(1.0)
+    assert any("cut to the time its clocks share, from 0.205 to 1 s" in w for w in run.warnings)
+
+
+@pytest.mark.parametrize(
+    ("steps", "begins", "said"),
+    [((0.01, 0.2), (0.0, 0.0), "export them at one rate"), ((0.01, 0.01), (0.0, 5.0), "overlap")],
+)
+def test_clocks_too_different_are_refused(tmp_path, steps, begins, said):
+    with pytest.raises(MeasurementError, match=said):
+        read_run(of_two_clocks(tmp_path / "r.mf4", steps, begins))
