@@ -102,5 +102,7 @@ class MdfFile(Table):
 
 def _text(comment: str | None) -> str:
     """A comment's own text, which MDF 4 may keep in XML."""
+    if not (comment or "").lstrip().startswith("<"):
+        return comment or ""
     found = _TX.search(comment or "")
-    return html.unescape(found[1]) if found else comment or ""
+    return html.unescape(found[1]) if found else ""

@@ -20,6 +20,7 @@ import pytest
 from ridetune.engine.errors import MeasurementError
 from ridetune.engine.formats import readers
 from ridetune.engine.formats.child import Bounds
+from ridetune.engine.formats.confine import landlock_version
 from ridetune.engine.formats.opening import opened
 from ridetune.engine.measurement import parse_run
 from scipy.io import savemat
@@ -262,7 +263,6 @@ def slow(monkeypatch, code):
     monkeypatch.setattr("ridetune.engine.formats.child.COMMAND", code)
 
 
-PRELUDE = "import ridetune.engine.formats.answers as a; "
 STUB = (
     "import ridetune.engine.formats.answering as b; "
     "b.read_as = lambda *_: ({}); import ridetune.engine.formats.answers as a; a.main()"
@@ -278,7 +278,7 @@ STUB = (
         ("__import__('time').sleep(60)", Bounds(wall=1.0), "took more than 1 s"),
         ("bytearray(1 << 32)", Bounds(), "takes more than 2 GB of memory"),
         ("__import__('os').write(int(__import__('sys').argv[1]), b'{}' * 99)", Bounds(), "nothing"),
-        ("open('/tmp/ridetune-garbage', 'wb').write(bytes(1 << 21))", Bounds(), "(OSError)"),
+        ("open('garbage', 'wb').write(bytes(1 << 21))", Bounds(), "(OSError)"),
         ("1 / 0", Bounds(), "(ZeroDivisionError); it is damaged"),
     ],
 )
@@ -304,6 +304,14 @@ def test_a_child_has_nothing_of_its_parents(tmp_path, monkeypatch):
     said = str(caught.value)
     assert said.startswith("[None, '', [], ")
     assert not os.path.exists(said.split("'")[-2])
+
+
+@pytest.mark.skipif(landlock_version() < 1, reason="this system has no Landlock")
+def test_a_child_leaves_nothing_outside_its_folder(tmp_path, monkeypatch):
+    slow(monkeypatch, STUB.format(f"open({str(tmp_path / 'garbage')!r}, 'w')"))
+    path = held(tmp_path, "r.tdms", b"TDSm" + bytes(100))
+    assert "(PermissionError)" in refusal(path)
+    assert not (tmp_path / "garbage").exists()
 
 
 def test_a_missing_package_is_named(tmp_path, monkeypatch):
