@@ -33,6 +33,7 @@ class Road:
     name : what a chart calls it
     interpolant : "spline" is C2, for heights that are smooth on the grid; "monotone" is C1 and
         never leaves the range of the two heights beside X, for heights that may hold kerbs
+    warnings : sentences about what is doubtful in where it comes from
     coefficients : (2, n - 1, 4), C-contiguous; c0 ... c3 of each cell of left and right
 
     Raises RoadError for heights that are not finite or unequal in number.
@@ -44,6 +45,7 @@ class Road:
     right: NDArray[np.float64]
     name: str = ""
     interpolant: Interpolant = "spline"
+    warnings: tuple[str, ...] = ()
     coefficients: NDArray[np.float64] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

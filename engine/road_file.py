@@ -5,6 +5,10 @@ heights beside it: a kerb stays a kerb, where a C2 spline would ring. X need not
 cubic is then sampled on a uniform grid whose spacing is the file's least one. X = 0 is where the
 car's CG stands at the start. Heights count from the road's beginning (the mean of both tracks
 there), so a survey's elevations above the sea do as well.
+
+OpenCRG files are read, too: see `formats.crg`. The wheels run half a track beside the reference
+line, X = 0 is its beginning, and the spacing is the file's own. What a scan lacks is filled by
+straight lines along X where that is short.
 """
 
 import io
@@ -18,6 +22,8 @@ from scipy.interpolate import PchipInterpolator
 
 from .csv_table import LARGEST_FILE, CsvTable
 from .errors import MeasurementError, RoadError
+from .formats.child import ChildTable
+from .formats.readers import HALF_TRACK, ROAD
 from .road import Road
 from .units import UnitError, to_si
 
@@ -39,22 +45,26 @@ HIGHEST_STEP, STEEPEST = 0.5, 1.0
 """Greatest rise (m) between two points steeper than the second number: beyond both, a unit is
 wrong."""
 
+LONGEST_GAP = 0.2
+"""Longest piece (m) of an OpenCRG road without heights that is filled: a tyre's contact is as
+long."""
+
 UNIFORM_TOLERANCE = 1e-3
 """X that is within this share of a step of a uniform grid counts as uniform."""
 
 _TITLE = re.compile(r"\s*(?P<name>\w+)\s*(?:[\[(]\s*(?P<unit>.*?)\s*[\])])?\s*")
 
 
-def read_road(path: str | Path) -> Road:
-    """Read a road file; raises RoadError with the file, the place and the remedy."""
+def read_road(path: str | Path, track: float = 2.0 * HALF_TRACK) -> Road:
+    """Read a road file; raises RoadError with the file, the place and the remedy.
+
+    track : how far apart the wheels run on an OpenCRG road, m
+    """
     path = Path(path)
-    if path.suffix.lower() == ".crg":
-        raise RoadError(
-            f"{path.name}: OpenCRG files are not read; export the two wheel tracks as CSV with the"
-            " columns x [m],left [m],right [m]."
-        )
     try:
         with path.open("rb") as stream:
+            if stream.read(1) == b"$" or path.suffix.lower() == ".crg":
+                return _crg(path, 0.5 * track)
             return _road(stream, path.name)
     except OSError as error:
         raise RoadError(
@@ -99,6 +109,51 @@ def _road(stream: BinaryIO, source: str) -> Road:
     if grid is not x:
         left, right = PchipInterpolator(x, np.stack([left, right]), axis=1)(grid)
     return Road(float(x[0]), spacing, left, right, name=source, interpolant="monotone")
+
+
+def _crg(path: Path, half_track: float) -> Road:
+    """The two wheel tracks of an OpenCRG road."""
+    source, options = path.name, {"left": half_track, "right": -half_track}
+    try:
+        with ChildTable(path, source, kind=ROAD, options=options) as table:
+            warnings = list(table.warnings)
+            x, left, right = (table.values(index) for index in range(3))
+    except MeasurementError as error:
+        raise RoadError(str(error)) from error
+    if x.size < FEWEST_POINTS:
+        raise RoadError(f"{source}: the road has {x.size} cross sections; export a longer one.")
+    left, filled_left = _filled(x, left, "left", source)
+    right, filled_right = _filled(x, right, "right", source)
+    if filled := filled_left + filled_right:
+        warnings.append(
+            f"{source}: {filled} of {2 * x.size} heights under the wheels are missing; straight"
+            " lines fill the gaps."
+        )
+    beginning = 0.5 * (left[0] + right[0])
+    left, right = left - beginning, right - beginning
+    _check_magnitudes(x, left, right, source)
+    spacing = float(x[-1] - x[0]) / (x.size - 1)
+    return Road(0.0, spacing, left, right, source, "monotone", tuple(warnings))
+
+
+def _filled(x: NDArray, heights: NDArray, side: str, source: str) -> tuple[NDArray, int]:
+    """Heights without gaps, and how many were missing; held at both ends, straight between."""
+    known = np.flatnonzero(np.isfinite(heights))
+    if known.size == 0:
+        raise RoadError(
+            f"{source}: there are no heights under the {side} wheels; choose another track."
+        )
+    beside = x[np.concatenate([[0], known, [x.size - 1]])]
+    # From one known height to the next, and from either end to the nearest one.
+    gaps = np.diff(beside)
+    widest = int(np.argmax(gaps))
+    if known.size < x.size and gaps[widest] > LONGEST_GAP + float(np.median(np.diff(x))):
+        raise RoadError(
+            f"{source}: under the {side} wheels the heights from x = {beside[widest]:g} to"
+            f" {beside[widest + 1]:g} m are missing, more than {LONGEST_GAP:g} m in one piece; fill"
+            " the gap, crop the road or choose another track."
+        )
+    return np.interp(x, x[known], heights[known]), int(x.size - known.size)
 
 
 def _columns(header: list[str], source: str) -> list[tuple[int, float]]:

@@ -11,6 +11,7 @@ from ...engine.measurement import read_run
 from ...engine.recorded_motion import recorded_motion
 from ...engine.road_file import read_road
 from ...engine.road_specs import IsoRoad
+from ...engine.vehicle import Vehicle
 from .arguments import rims_settings
 from .inputs import find_manoeuvre, read_runs, recording_files
 
@@ -48,7 +49,7 @@ def files_read(options: Namespace) -> tuple[str | Path | None, ...]:
     return (options.vehicle, options.manoeuvre, options.road, *recordings)
 
 
-def excitation(options: Namespace, mode: Mode) -> Excitation:
+def excitation(options: Namespace, mode: Mode, vehicle: Vehicle) -> Excitation:
     """What the options let the car go through."""
     if mode == "rims":
         [run] = read_runs([options.rims], options.braking or ())
@@ -67,5 +68,12 @@ def excitation(options: Namespace, mode: Mode) -> Excitation:
         manoeuvre = replace(manoeuvre, seed=options.road_seed)
     if manoeuvre.kind == "posts" and options.road:
         raise SimulationError(f"{manoeuvre.name} moves the posts of a rig; leave out --road.")
-    road = read_road(options.road) if options.road else None
+    track = 0.5 * (vehicle.front.track + vehicle.rear.track)
+    road = read_road(options.road, track) if options.road else None
     return FreeExcitation(manoeuvre, road, **how)
+
+
+def doubts(driven: Excitation) -> tuple[str, ...]:
+    """What is doubtful in the road that is driven."""
+    road = driven.road if isinstance(driven, FreeExcitation) else None
+    return () if road is None else road.warnings

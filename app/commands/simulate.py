@@ -4,7 +4,7 @@ from argparse import Namespace
 
 from ...engine.errors import SimulationError
 from ...engine.measurement import run_to_csv
-from .excitation import excitation, files_read, mode_of
+from .excitation import doubts, excitation, files_read, mode_of
 from .inputs import find_vehicle
 from .output import print_fit_percent, print_warnings, require_place, write_file
 
@@ -16,7 +16,8 @@ def simulate(options: Namespace) -> None:
         raise SimulationError("Nothing says where the run goes; add -o run.csv.")
     require_place(options.output, files_read(options))
     vehicle = find_vehicle(options.vehicle)
-    simulation = excitation(options, mode).simulate(vehicle, options.model)
+    driven = excitation(options, mode, vehicle)
+    simulation = driven.simulate(vehicle, options.model)
     if simulation.fit_percent:
         print_fit_percent({simulation.run.name: simulation.fit_percent})
     if options.output:
@@ -26,4 +27,4 @@ def simulate(options: Namespace) -> None:
     lost = [f"{corner} {100.0 * share:.1f} %" for corner, share in shares if share > 0.0]
     if lost:
         print(f"Share of the time with a tyre load at or below zero: {', '.join(lost)}.")
-    print_warnings(simulation.warnings)
+    print_warnings([*doubts(driven), *simulation.warnings])

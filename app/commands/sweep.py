@@ -16,7 +16,7 @@ from ...engine.sweep_file import description, form_of, write_blocks
 from ...engine.vehicle import Vehicle
 from ...engine.vehicle_file import write_vehicle
 from .arguments import levels, ranges, whole
-from .excitation import excitation, files_read, mode_of
+from .excitation import doubts, excitation, files_read, mode_of
 from .inputs import find_vehicle
 from .output import (
     make_folder,
@@ -37,7 +37,8 @@ def sweep(options: Namespace) -> None:
     require_place(options.output, inputs)
     design = _design(options)
     numbers = _numbers(options.histories, design.cars)
-    vehicle, driven = find_vehicle(options.vehicle), excitation(options, mode)
+    vehicle = find_vehicle(options.vehicle)
+    driven = excitation(options, mode, vehicle)
     summary = Summary()
     with watch(_line) as progress:
         blocks = sweep_cars(vehicle, design, driven, threads=options.threads, progress=progress)
@@ -47,6 +48,7 @@ def sweep(options: Namespace) -> None:
             write_blocks(stream, form, description(vehicle, design, driven), summary.noting(blocks))
     print(f"Wrote {options.output}: {design.cars} cars.")
     summary.print()
+    print_warnings(doubts(driven))
     if numbers:
         print_warnings(
             _write_histories(vehicle, design, driven, dict(zip(numbers, files, strict=True)))

@@ -1,12 +1,14 @@
 """OpenCRG roads, by pyopencrg: heights along two tracks beside the reference line.
 
-The columns are u, the distance along the reference line, and z at v = left and v = right, m. z is
-the surface's: the grid's height by linear interpolation across it, the reference line's own height
-and its banking included. Where the reference line points is not taken. NaN is what the scan lacks.
+The columns are x, the distance along the reference line from its beginning, and the grid's height
+at v = left and at v = right, m, linear between the long sections. It counts from the reference
+line: where the line turns, climbs or banks is not taken, as the car is driven straight and level,
+and a sentence says so. NaN is what a scan lacks.
 """
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,14 +16,8 @@ from ..errors import MeasurementError
 from .listing import MOST_SAMPLES
 from .table import Array, Column, Table
 
-HALF_TRACK = 0.75
-"""How far left and right of the reference line the wheels run unless it is told, m."""
-
 LARGEST = 1_000_000_000
 """Longest OpenCRG file, bytes."""
-
-DECLARED = 4096
-"""Bytes of a file that must hold its definition's beginning."""
 
 _DAMAGE = ("multiple of", "not correctly padded", "truncated")
 
@@ -47,8 +43,8 @@ class CrgFile(Table):
         try:
             road = pyopencrg.read(str(path))
         except pyopencrg.CrgCheckError as error:
-            raise self._refused(str(error), head) from error
-        left, right = options.get("left", HALF_TRACK), options.get("right", -HALF_TRACK)
+            raise self._refused(str(error)) from error
+        left, right = options["left"], options["right"]
         if not road.v_min <= right < left <= road.v_max:
             raise MeasurementError(
                 f"{source}: the road reaches from v = {road.v_min:g} to {road.v_max:g} m across,"
@@ -60,24 +56,17 @@ class CrgFile(Table):
                 " it."
             )
         u = np.asarray(road.u, dtype=np.float64)
-        self._numbers = [
-            u - u[0],
-            *(road.uv_to_z(u, np.full_like(u, v)) for v in (left, right)),
-        ]
+        tracks = [road.uv_to_z(u, np.full_like(u, v), grid_only=True) for v in (left, right)]
+        self._numbers = [u - u[0], *tracks]
         self.columns = tuple(Column(name, "m", len(u)) for name in ("x", "left", "right"))
         self.warnings = (*_ignored(road, source),)
 
-    def _refused(self, said: str, head: bytes) -> MeasurementError:
+    def _refused(self, said: str) -> MeasurementError:
         if any(mark in said for mark in _DAMAGE):
-            ends = (
-                "; its line ends were converted as if it were text"
-                if b"\r" in head or b"\n" not in head[80:]
-                else ""
-            )
-            remedy = "transfer the file again in binary mode"
             return MeasurementError(
-                f"{self.source}: the binary heights of this OpenCRG file are damaged, as by a"
-                f" conversion of line ends or a transfer cut short{ends}; {remedy}."
+                f"{self.source}: the binary heights of this OpenCRG file are damaged, as a"
+                " conversion of its line ends or a transfer cut short does; transfer it again in"
+                " binary mode."
             )
         first = next((line for line in said.splitlines()[1:] if line.strip()), said)
         return MeasurementError(
@@ -90,12 +79,19 @@ class CrgFile(Table):
         return np.ascontiguousarray(self._numbers[index], dtype=np.float64)
 
 
-def _ignored(road, source: str) -> list[str]:
-    """Sentences on what the reference line does that the two tracks do not keep."""
-    if road.is_straight:
+def _ignored(road: Any, source: str) -> list[str]:
+    """A sentence on what the reference line does and the two tracks do not."""
+    does = []
+    if not road.is_straight:
+        turned = float(np.degrees(np.ptp(np.unwrap(road.phi))))
+        does.append(f"turns by up to {turned:.3g} deg")
+    for what, values in (("climbs", road.slope), ("banks", road.banking)):
+        steepest = float(np.max(np.abs(values), initial=0.0))
+        if steepest > 0.0:
+            does.append(f"{what} by up to {100.0 * steepest:.3g} %")
+    if not does:
         return []
-    turned = float(np.degrees(np.ptp(np.unwrap(road.phi))))
     return [
-        f"{source}: the reference line turns by {turned:.3g} deg; the road is driven straight,"
-        " its heights taken along the line."
+        f"{source}: the road {', '.join(does)}; it is driven straight and level, with the heights"
+        " over its reference line."
     ]

@@ -13,6 +13,9 @@ from .table import Table
 ROAD = "OpenCRG"
 """The kind of a road, which is told and not looked for."""
 
+HALF_TRACK = 0.75
+"""How far left and right of a road's reference line the wheels run unless it is told, m."""
+
 
 class Reader(NamedTuple):
     """A module here with its class, and the package it needs."""

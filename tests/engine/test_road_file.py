@@ -129,8 +129,3 @@ def test_a_file_is_read_by_its_path(tmp_path):
     assert_allclose(read_road(path).left, [0, 0.01, 0])
     with pytest.raises(RoadError, match=r"none\.csv.*cannot be read.*check the path"):
         read_road(tmp_path / "none.csv")
-
-
-def test_opencrg_is_refused_with_what_is_read_instead(tmp_path):
-    with pytest.raises(RoadError, match=r"block\.crg: OpenCRG files are not read; .*CSV"):
-        read_road(tmp_path / "block.crg")

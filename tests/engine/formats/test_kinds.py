@@ -4,6 +4,7 @@ Oracle: the numbers, names and units that were written; the library's own reader
 """
 
 from datetime import UTC, datetime
+from pathlib import Path
 
 import cmerg
 import numpy as np
@@ -19,6 +20,8 @@ from ridetune.engine.mdf4 import run_to_mdf4
 from ridetune.engine.measurement import read_run
 
 from tests import files_of_kinds as files
+
+DATA = Path(__file__).parents[2] / "data"
 
 
 @pytest.fixture(scope="module")
@@ -131,3 +134,21 @@ def test_the_run_is_cut_to_what_its_clocks_share(tmp_path):
 def test_clocks_too_different_are_refused(tmp_path, steps, begins, said):
     with pytest.raises(MeasurementError, match=said):
         read_run(of_two_clocks(tmp_path / "r.mf4", steps, begins))
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("non_ascii_header.uff", "ref6_23_Mar is a spectrum, not a time history"), ("time", "")],
+)
+def test_files_of_other_programs(name, said):
+    """Oracle: what the text of the file says; its last row of numbers is not filled."""
+    if said:
+        with pytest.raises(MeasurementError, match=said):
+            read_run(DATA / "uff" / name)
+        return
+    path = DATA / "uff/time-history-not-all-columns-filled.uff"
+    with ChildTable(path, path.name) as table:
+        (column,) = table.columns
+        assert (column.unit, column.samples, column.step) == ("m/s\u00b2", 13, 5e-5)
+        values = table.values(0)
+    assert_allclose([values[0], values[-1]], [-3.81956, -5.84096])
