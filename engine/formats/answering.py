@@ -74,7 +74,7 @@ class Answering:
         if not kind:
             with Path(path).open("rb") as stream:
                 kind = kind_of(stream, source)
-        self._kind = kind
+        self._kind, self._table = kind, None
         self._table = read_as(kind, Path(path), source, options)
         return {"kind": self._table.kind}, ()
 

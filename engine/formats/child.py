@@ -72,8 +72,8 @@ class ChildTable(Table):
     ):
         self.source = source
         self._bounds = bounds
-        self._listed: dict[str, Any] | None = None
-        self._titles: tuple[tuple[str, str], ...] | None = None
+        self._listed: dict[str, Any] | None
+        self._titles: tuple[tuple[str, str], ...] | None
         size = path.stat().st_size
         self._limits = {
             "memory": bounds.memory + size,
@@ -86,13 +86,17 @@ class ChildTable(Table):
         try:
             with theirs:
                 self._process = self._started(theirs)
-            head, _ = self._ask(
-                "open", path=str(path.absolute()), source=source, kind=kind, options=options or {}
-            )
-            self.kind = plain(head.get("kind", ""))
+            self._open(path, kind, options or {})
         except BaseException:
             self.close()
             raise
+
+    def _open(self, path: Path, kind: str, options: Mapping[str, float]) -> None:
+        self._listed = self._titles = None
+        head, _ = self._ask(
+            "open", path=str(path.absolute()), source=self.source, kind=kind, options=options
+        )
+        self.kind = plain(head.get("kind", ""))
 
     def _started(self, theirs: socket.socket) -> subprocess.Popen[bytes]:
         threads = ("OPENBLAS", "OMP", "MKL", "NUMEXPR", "NUMEXPR_MAX")
