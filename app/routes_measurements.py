@@ -46,9 +46,9 @@ def measurement_to_json(kept: Measurement) -> dict[str, Any]:
     }
 
 
-@router.post("", status_code=201, openapi_extra=openapi("text/csv"))
+@router.post("", status_code=201, openapi_extra=openapi("text/csv", "application/octet-stream"))
 async def upload(sid: SessionId, services: Shared, received: Recording) -> dict[str, Any]:
-    """Upload a recording: a form with the part `file`, or the bare file with ?name=."""
+    """Upload a recording of any kind: a form with the part `file`, or the bare file with ?name=."""
     async with services.parsing:
         kept = await run_in_threadpool(_keep, services, sid, received)
     return measurement_to_json(kept)

@@ -15,11 +15,12 @@ LONGEST_NAME = 100
 IN_MEMORY = 1_000_000
 
 
-def openapi(media_type: str) -> dict[str, Any]:
+def openapi(*media_types: str) -> dict[str, Any]:
     """How the description of the interface shows a request with one file."""
     file = {"type": "string", "format": "binary"}
     form = {"type": "object", "required": ["file"], "properties": {"file": file}}
-    content = {"multipart/form-data": {"schema": form}, media_type: {"schema": file}}
+    bare = dict.fromkeys(media_types, {"schema": file})
+    content = {"multipart/form-data": {"schema": form}, **bare}
     return {"requestBody": {"required": True, "content": content}}
 
 

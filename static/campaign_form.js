@@ -63,7 +63,7 @@ function more() {
       number("road_seed", "Seed of the roads", { min: "0", step: "1", placeholder: "as it is" },
         "Another whole number draws other random roads; empty: as the manoeuvre has it"),
       select("format", "Recordings as", get("formats"),
-        "CSV becomes measurements here; MDF4 can be downloaded, and is not read back")),
+        "CSV becomes measurements here; MDF4 can be downloaded, and added like any recording")),
     missing("formats"), parts.sensors);
 }
 

@@ -12,6 +12,10 @@ import { settled } from "./simulation.js";
 import { get, on, set } from "./store.js";
 import * as units from "./units.js";
 
+/** Names of what the service reads, as in engine/formats/readers.py; the content decides. */
+const RECORDINGS = ".csv,.txt,.tsv,.dat,.asc,.mf4,.mdf,.mf3,.mat,.h5,.hdf5,.hdf,.tdms,.uff,.unv,.uf58,"
+  + ".rsp,.rpc,.tim,.drv,.parquet,.erg,.zip,text/csv";
+
 const PREVIEW_SAMPLES = 1500;
 
 let selected = null;
@@ -25,7 +29,7 @@ export function build(callbacks) {
   parts.list = h("div");
   parts.detail = h("div", { className: "measurement-detail scrolls" });
   parts.file = h("input", {
-    type: "file", id: "file", multiple: true, accept: ".csv,.txt,.toml,.json,text/csv", className: "hidden-file",
+    type: "file", id: "file", multiple: true, accept: RECORDINGS + ",.toml,.json", className: "hidden-file",
     "aria-label": "Measurement files",
     on: { change: () => { sort([...parts.file.files]); parts.file.value = ""; } },
   });

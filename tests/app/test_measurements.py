@@ -6,6 +6,7 @@ import json
 import pytest
 from ridetune.engine.manoeuvre import manoeuvre_to_json, reference_manoeuvres
 
+from .. import files_of_kinds
 from .conftest import SAMPLES, Visitor, open_client, short_recording
 from .test_frames import read_binary
 
@@ -26,6 +27,23 @@ def test_an_upload_says_what_was_found_in_it(visitor):
     assert (heave["minimum"], heave["maximum"]) == pytest.approx((-0.004, 0.004))
     assert visitor.get(f"/measurements/{found['id']}").json() == found
     assert visitor.get("/measurements").json()[-1] == found
+
+
+@pytest.mark.parametrize("name", files_of_kinds.WRITERS)
+def test_every_kind_of_recording_is_an_upload(visitor, tmp_path, name):
+    """Oracle: the numbers that were written; a CarMaker recording comes with its description."""
+    write, _, off = files_of_kinds.WRITERS[name]
+    write(tmp_path / name)
+    reply = visitor.upload((tmp_path / name).read_bytes(), name)
+    if name.endswith(".erg"):
+        assert reply.status_code == 422
+        assert "pack the two into one .zip" in reply.json()["detail"]
+        return
+    assert reply.status_code == 201, reply.text
+    found = {channel["name"]: channel for channel in reply.json()["channels"]}
+    z = 1e-3 * files_of_kinds.Z
+    extremes = [found["chassis.z"][one] for one in ("minimum", "maximum")]
+    assert extremes == pytest.approx([z.min(), z.max()], rel=1e-15, abs=1e-3 * off)
 
 
 def test_a_bare_body_is_an_upload_too(visitor):
@@ -158,6 +176,9 @@ BAD_FILES = {
     "misspelt channel": (short_recording().replace(b"wheel.rl.z", b"wheel.rl.zz"), "wheel.rl.z"),
     "time falls": (short_recording().replace(b"\n0.50,", b"\n0.10,"), "line 52"),
     "a gap": (short_recording().replace(b"\n0.50,", b"\n0.50,,,,,,,\n0.505,"), "line 52"),
+    "an array": (b"\x93NUMPY\x01\x00" + bytes(100), "is a NumPy array"),
+    "packed": (b"\x1f\x8b\x08" + bytes(100), "is packed with gzip; unpack it"),
+    "half a TDMS file": (b"TDSm" + bytes(24), "cannot be read as TDMS"),
     "not a number": (short_recording().replace(b"\n0.50,", b"\n0.50,nan,"), "line 52"),
     "overflow": (short_recording().replace(b"\n0.50,", b"\n1e999,"), "line 52"),
 }
