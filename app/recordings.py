@@ -127,6 +127,10 @@ def parse(data: bytes, name: str, noise: Mapping[str, float] | None = None) -> R
             f"{name}: the file is too large or too deep to read ({type(error).__name__}); "
             "send a plain CSV."
         ) from None
+    except OSError as error:
+        raise MeasurementError(
+            f"{name}: there is no room to read the file ({error.strerror}); try again later."
+        ) from error
 
 
 def recorded(data: bytes, name: str, noise: Mapping[str, float] | None = None) -> NewMeasurement:

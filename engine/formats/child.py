@@ -86,6 +86,12 @@ class ChildTable(Table):
         try:
             with theirs:
                 self._process = self._started(theirs)
+        except OSError as error:
+            self.close()
+            raise self._refused(
+                f"its reader cannot be started ({error.strerror}); try again later"
+            ) from error
+        try:
             self._open(path, kind, options or {})
         except BaseException:
             self.close()
@@ -122,6 +128,11 @@ class ChildTable(Table):
             pass_fds=[theirs.fileno()],
             start_new_session=True,
         )
+
+    @property
+    def pid(self) -> int:
+        """The child's process."""
+        return self._process.pid
 
     def __enter__(self) -> "ChildTable":
         """The table itself."""
@@ -190,8 +201,10 @@ class ChildTable(Table):
         if self._listed is None:
             head, _ = self._ask("columns")
             try:
+                columns = tuple(map(_column, head["columns"][:MOST_COLUMNS]))
+                _check_clocks(columns)
                 self._listed = {
-                    "columns": tuple(map(_column, head["columns"][: MOST_COLUMNS + 1])),
+                    "columns": columns,
                     "warnings": tuple(_sentence(one, self.source) for one in head["warnings"]),
                     "comment": str(head["comment"]),
                 }
@@ -267,6 +280,16 @@ def _column(fields: Any) -> Column:
         None if step is None else float(step),
         plain(comment),
     )
+
+
+def _check_clocks(columns: Sequence[Column]) -> None:
+    """Raise ValueError for a time that is no column or of another length."""
+    for column in columns:
+        clock = column.clock
+        if clock is not None and not (
+            0 <= clock < len(columns) and columns[clock].samples == column.samples
+        ):
+            raise ValueError("clock")
 
 
 def _sentence(text: Any, source: str) -> str:

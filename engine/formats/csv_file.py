@@ -1,11 +1,13 @@
 """CSV and other text as a table: the columns are titled `name [unit]`, or carry a row of units."""
 
+import io
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import BinaryIO
 
-from ..csv_table import CsvTable, split_title
+from ..csv_table import LARGEST_FILE, CsvTable, split_title
+from ..errors import MeasurementError
 from .listing import nearest_clocks
 from .table import Array, Column, Table
 
@@ -19,6 +21,12 @@ class CsvFile(Table):
 
     def __init__(self, stream: BinaryIO, source: str):
         self.source = source
+        size = stream.seek(0, io.SEEK_END)
+        if size > LARGEST_FILE:
+            raise MeasurementError(
+                f"{source}: the file has {size / 1e6:.0f} MB, more than {LARGEST_FILE / 1e6:.0f}"
+                " MB; cut the recording or thin it out."
+            )
         self._table = CsvTable(stream, source)
 
     @classmethod

@@ -1,6 +1,5 @@
 """What a file is, by its first bytes; its name only where those of two kinds are alike."""
 
-import io
 import re
 import zipfile
 from pathlib import Path
@@ -47,6 +46,11 @@ _ERG_INFO = re.compile(rb"\s*#?.*File\.Format\s*=\s*erg", re.IGNORECASE | re.DOT
 
 def kind_of(stream: BinaryIO, source: str) -> str:
     """The kind of a file; MeasurementError for those that are not read, with the remedy."""
+    return kind_by_head(stream, source) or _zipped(stream, source)
+
+
+def kind_by_head(stream: BinaryIO, source: str) -> str:
+    """The same without a look into a zip archive, whose kind is "" here."""
     stream.seek(0)
     head = stream.read(HEAD)
     for magic, program in _PACKED.items():
@@ -58,7 +62,7 @@ def kind_of(stream: BinaryIO, source: str) -> str:
     if _PICKLE.match(head) and (b"c" in head[:64] or b"\x8c" in head[:64] or head[2:3] in b"}]K("):
         raise _refused(source, f"is a pickle of Python, which is never opened; {_AS_CSV}")
     if head.startswith(b"PK\x03\x04") or head.startswith(b"PK\x05\x06"):
-        return _zipped(stream, source)
+        return ""
     return _recognized(head, source)
 
 
@@ -125,11 +129,6 @@ def erg_pair(archive: zipfile.ZipFile, source: str) -> tuple[zipfile.ZipInfo, zi
             " pack the two and nothing else",
         )
     return entries[recordings[0]], entries[f"{recordings[0]}.info"]
-
-
-def kind_of_bytes(data: bytes, source: str) -> str:
-    """The kind of a file in memory."""
-    return kind_of(io.BytesIO(data), source)
 
 
 def _refused(source: str, what: str) -> MeasurementError:

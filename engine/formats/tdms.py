@@ -11,9 +11,6 @@ from typing import Any
 from .listing import Listing, first_text, nearest_clocks, numbers, plain
 from .table import Array, Column, Table
 
-MOST_SEGMENT_SHARE = 64
-"""Samples a byte of the file may stand for at most: a repeated index is short, its data are not."""
-
 
 class TdmsTable(Table):
     """A TDMS file, read channel by channel."""
@@ -31,7 +28,7 @@ class TdmsTable(Table):
                 listing.leave_out(channel.name, "holds no samples")
             elif channel.dtype.kind not in "iufbM":
                 listing.leave_out(channel.name, "holds no plain numbers")
-            elif len(channel) > size * MOST_SEGMENT_SHARE:
+            elif len(channel) > size:  # a sample takes a byte at least
                 listing.leave_out(channel.name, "declares more samples than the file holds")
             else:
                 taken.append(channel)

@@ -6,7 +6,7 @@ import pytest
 import ridetune.sample_runs
 from ridetune.engine.channels import CHANNELS, Run
 from ridetune.engine.errors import MeasurementError
-from ridetune.engine.formats import opening
+from ridetune.engine.formats import csv_file
 from ridetune.engine.measurement import (
     missing_for_identification,
     parse_run,
@@ -262,7 +262,7 @@ def test_two_samples_are_too_few():
 
 
 def test_a_file_too_large_is_refused_unread(monkeypatch):
-    monkeypatch.setattr(opening, "LARGEST_FILE", 100)
+    monkeypatch.setattr(csv_file, "LARGEST_FILE", 100)
     assert "run.csv: the file has 0 MB, more than 0 MB; cut" in refusal(small("chassis.z [m]"))
 
 

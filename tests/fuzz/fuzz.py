@@ -52,7 +52,7 @@ class Worker(ChildTable):
     def spent(self) -> bool:
         """Whether most of its processor time is gone: many files share it."""
         with suppress(OSError, ValueError, IndexError):
-            fields = Path(f"/proc/{self._process.pid}/stat").read_text().rpartition(")")[2].split()
+            fields = Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()
             ticks = int(fields[11]) + int(fields[12])
             return ticks / os.sysconf("SC_CLK_TCK") > 0.4 * BOUNDS.cpu
         return True
