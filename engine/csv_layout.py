@@ -52,11 +52,12 @@ def find_layout(lines: Iterator[tuple[int, str]]) -> Layout | None:
     if plain is not None:
         return plain
     head += islice(filled, MOST_LINES)
-    delimiters = [separator] if separator else [",", ";", "\t", "|", " "]
+    delimiters = separator or ",;\t|"
     found = [layout for one in delimiters if (layout := _searched(head, one))]
-    # More columns are better; of as many, the delimiter that comes first.
+    # More columns are better; of as many, the delimiter that comes first; spaces, which names
+    # and units may hold, come last.
     best = max(found, key=lambda layout: len(layout.titles), default=None)
-    return best or _first_line(head, separator)
+    return best or (separator is None and _searched(head, " ")) or _first_line(head, separator)
 
 
 def _first_line(head: list[tuple[int, str]], separator: str | None) -> Layout:
@@ -97,12 +98,24 @@ def _searched(head: list[tuple[int, str]], delimiter: str) -> Layout | None:
         if place >= 2 and _units(rows[place - 2], above):
             units, names = above, place - 2
         titles = [cell.lstrip("#%").strip() for cell in rows[names]]
-        titles = titles[1:] if delimiter == " " and titles and not titles[0] else titles
+        if delimiter == " ":
+            titles = _joined(titles)
         if len(titles) < width or len(titles) < 2 or _is_data(titles):
             return None
         shown = titles if units is None else _with_units(titles, units)
         return Layout(delimiter, head[place - 1][0], shown, delimiter == " ")
     return None
+
+
+def _joined(words: list[str]) -> list[str]:
+    """Titles that spaces part: a unit in brackets belongs to the name before it."""
+    titles: list[str] = []
+    for word in filter(None, words):
+        if titles and word[0] in "[(":
+            titles[-1] += f" {word}"
+        else:
+            titles.append(word)
+    return titles
 
 
 def _cells(line: str, delimiter: str) -> list[str]:
@@ -149,6 +162,6 @@ def _is_unit(cell: str) -> bool:
 def _with_units(names: list[str], units: list[str]) -> list[str]:
     bare = [unit.strip("[]() ") for unit in units] + [""] * (len(names) - len(units))
     return [
-        f"{name} [{unit}]" if unit and unit != "-" else name
+        f"{name} [{unit}]" if unit and unit != "-" and name[-1:] not in "])" else name
         for name, unit in zip(names, bare, strict=True)
     ]

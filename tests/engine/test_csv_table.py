@@ -233,3 +233,51 @@ def test_plain_decimal_numbers_are_numbers(text):
 @pytest.mark.parametrize("text", ["", "nan", "0x1", "1e", "time", "1.2.3", "."])
 def test_other_texts_are_no_numbers(text):
     assert not is_number(text)
+
+
+PAIR = ["time [s]", "chassis.z [mm]"]
+LAYOUTS = {
+    "a row of units": ("time;chassis.z\ns;mm\n0,0;1,5\n0,1;2,5\n", PAIR),
+    "units in brackets": ("time,chassis.z\n[s],[mm]\n0,1.5\n0.1,2.5\n", PAIR),
+    "units twice": ("time [s],chassis.z\ns,mm\n0,1.5\n0.1,2.5\n", PAIR),
+    "a unit of several words": (
+        "time,v\ns,km/h\n0,1.5\n0.1,2.5\n",
+        ["time [s]", "v [km/h]"],
+    ),
+    "lines above": (
+        "Project X\nDate: 1.2.2020, driver: Y\n\ntime [s]\tchassis.z [mm]\n0\t1.5\n0.1\t2.5\n",
+        PAIR,
+    ),
+    "lines above and units": (
+        "Title;\nAuthor;Max\nZeit;Weg\ns;mm\n0;1,5\n0,1;2,5\n",
+        ["Zeit [s]", "Weg [mm]"],
+    ),
+    "spaces": ("# time   chassis.z\n 0.0   1.5\n 0.1   2.5\n", ["time", "chassis.z"]),
+    "spaces and units": ("log 7\ntime [s]  chassis.z [mm]\n0  1.5\n0.1  2.5\n", PAIR),
+    "bars": ("time [s]|chassis.z [mm]\n0|1.5\n0.1|2.5\n", PAIR),
+    "latin-1": (
+        "Zeit [s];D\u00e4mpfer\n0;1,5\n0,1;2,5\n".encode("latin-1"),
+        ["Zeit [s]", "D\u00e4mpfer"],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_headers_of_other_programs_are_found(name):
+    content, header = LAYOUTS[name]
+    table = table_of(content)
+    assert table.header == header
+    assert table.count() == 2
+    np.testing.assert_array_equal(table.numbers([0, 1]), [[0.0, 1.5], [0.1, 2.5]])
+
+
+def test_a_spoilt_first_row_is_no_header():
+    """A file of ours stays one: its first line names the time."""
+    for row, column in (("0,abc", "chassis.z"), ("foo,bar", "time")):
+        said = refusal(f"time [s],chassis.z [mm]\n{row}\n0.1,2\n0.2,3\n")
+        assert f"line 2, column {column}" in said
+
+
+def test_empty_cells_are_gaps_where_they_are_asked_for():
+    table = table_of("time,a\n0,\n1,2\n2,nan\n")
+    np.testing.assert_array_equal(table.with_gaps(1), [np.nan, 2.0, np.nan])
