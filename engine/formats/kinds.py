@@ -91,7 +91,9 @@ def _recognized(head: bytes, source: str) -> str:
         raise _refused(source, "is an OpenCRG road, not a recording; give it where a road is asked")
     if suffix == ".info" or (b"File.At.1.Name" in head and _ERG_INFO.match(head)):
         raise _refused(
-            source, "is the description beside a CarMaker recording; choose the .erg file itself"
+            source,
+            "is the description beside a CarMaker recording; choose the .erg with it beside, or"
+            " pack the two into one .zip and send that",
         )
     return CSV
 

@@ -479,7 +479,7 @@ def test_a_campaign_that_cannot_be_driven_is_refused(folder, capsys, arguments, 
 
 
 def test_mdf4_without_its_package_says_what_to_install(folder, capsys, monkeypatch):
-    monkeypatch.setattr("ridetune.engine.mdf4.find_spec", lambda name: None)
+    monkeypatch.setattr("ridetune.engine.formats.readers.find_spec", lambda name: None)
     message = refused(capsys, "campaign", "--format", "mf4", "-o", "runs")
     assert message.endswith("install ridetune[formats], or take CSV.")
     assert not list(folder.iterdir())
