@@ -30,6 +30,12 @@ from .errors import MeasurementError
 from .formats.kinds import CSV
 from .formats.opening import opened, opened_bytes
 from .formats.table import Table
+from .plausibility import (
+    doubtful_magnitude,
+    doubtful_time,
+    require_increasing,
+    require_samples,
+)
 from .run_notes import (
     RunNotes,
     checked_noise,
@@ -38,14 +44,7 @@ from .run_notes import (
     notes_in,
     read_notes,
 )
-from .spikes import spikes
 from .units import UnitError, to_si
-
-FEWEST_SAMPLES = 10
-"""Fewest samples a measurement may have."""
-
-COARSEST_STEP = 0.2
-"""Time between samples, s, from which on the unit of time is doubtful."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,16 +161,13 @@ def run_from_table(
     else:
         time, values, said = on_one_clock(table, ways)
         found += said
-    if len(time) < FEWEST_SAMPLES:
-        raise MeasurementError(
-            f"{source}: the file holds {len(time)} samples, at least {FEWEST_SAMPLES} are"
-            " needed; record longer or sample faster."
-        )
-    _require_increasing(time, table)
-    found += _doubtful_time(time)
-    for column in chosen:
-        if column.info.name != "time":
-            found += _doubtful_magnitude(column, time, values[column.info.name])
+    require_samples(len(time), source)
+    require_increasing(time, table.place, source)
+    found += doubtful_time(time)
+    for one in chosen:
+        if one.info.name != "time":
+            unit = one.unit or one.info.unit
+            found += doubtful_magnitude(one.info, unit, one.factor, time, values[one.info.name])
     known = checked_noise(noise or {}, source)
     found += doubtful_noise(known, values)
     return Run(source, time, values, known, tuple(found), description)
@@ -300,42 +296,3 @@ def _misspells(name: str, known: str) -> bool:
 
 def _shortened(title: str) -> str:
     return title if len(title) <= 40 else f"{title[:37]}..."
-
-
-def _require_increasing(time: NDArray[np.float64], table: Table) -> None:
-    backwards = np.flatnonzero(np.diff(time) <= 0.0)
-    if backwards.size:
-        row = int(backwards[0]) + 1
-        place = table.place(row)
-        noun = place.split()[0]
-        raise MeasurementError(
-            f"{table.source}: {place}: time {time[row]:.10g} s does not come after"
-            f" {time[row - 1]:.10g} s of the {noun} before; sort the {noun}s by time and keep one"
-            " for each time."
-        )
-
-
-def _doubtful_time(time: NDArray[np.float64]) -> list[str]:
-    step = float(np.median(np.diff(time)))
-    if step <= COARSEST_STEP:
-        return []
-    return [f"time advances by {step:.3g} s a sample; is it in ms?"]
-
-
-def _doubtful_magnitude(
-    column: Chosen, time: NDArray[np.float64], values: NDArray[np.float64]
-) -> list[str]:
-    """A warning when a channel's greatest value makes its stated unit, or itself, doubtful."""
-    info = column.info
-    if found := spikes(info, time, values):
-        return found
-    peak = float(np.max(np.abs(values)))
-    shown = f"{peak / column.factor:.4g} {column.unit or info.unit}"
-    if peak > info.largest:
-        smaller = to_si(info.display_unit, info.unit)[0] < column.factor
-        doubt = f"is it in {info.display_unit}?" if smaller else "check its unit and rest value."
-        return [f"{info.name} reaches {shown}; {doubt}"]
-    if 0.0 < peak < info.smallest:
-        doubt = f"is it in {info.unit}?" if column.factor < 1.0 else "check its unit."
-        return [f"{info.name} stays within {shown}; {doubt}"]
-    return []
