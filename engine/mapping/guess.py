@@ -1,0 +1,228 @@
+"""Which column is which channel: every pair is scored, and the columns are handed out so that the
+scores are greatest together and no channel is given twice.
+
+A score is how well the name fits (`patterns`) times what unit and numbers leave of it (`sizes`).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from ..channels import ChannelInfo, channel, find_channel
+from ..csv_table import split_title
+from ..formats.table import Column
+from .mapping import ChannelMapping, MappedColumn, places
+from .names import readings
+from .numbers import Statistics
+from .patterns import MEASURES, fits
+from .signs_stated import stated_sign
+from .sizes import TakenUnit, measured_by, plain_unit, taken_unit
+
+THRESHOLD = 0.45
+"""Confidence from which a column is proposed as a channel."""
+
+CANDIDATE, MOST_CANDIDATES = 0.15, 4
+"""Confidence from which a channel is offered for a column, and how many are."""
+
+NEVER_CHANGES = 0.7
+"""What is left of the confidence in a column that never changes."""
+
+FITS_AS_WELL = 0.05
+"""Difference in confidence by which a second column fits a channel as well."""
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A channel that a column may be.
+
+    confidence : from 0 to 1;  reason : what speaks for it and what against, in words
+    doubted : whether the unit is another one than the file states
+    """
+
+    channel: str
+    unit: str
+    sign: int
+    confidence: float
+    reason: str
+    doubted: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Guess:
+    """What is proposed for a file.
+
+    chosen : by column, what it is proposed as
+    candidates : for each column what it may be, the likeliest first
+    warnings : sentences about what needs a look
+    """
+
+    mapping: ChannelMapping
+    chosen: Mapping[int, Candidate]
+    candidates: tuple[tuple[Candidate, ...], ...]
+    warnings: tuple[str, ...]
+
+
+def named_like_channels(columns: Sequence[Column]) -> list[int]:
+    """Columns whose names alone make them a candidate: those whose numbers need a look."""
+    return [index for index, one in enumerate(columns) if _candidates(one, None, False)]
+
+
+def guess(columns: Sequence[Column], known: Mapping[int, Statistics]) -> Guess:
+    """What the columns of a file probably are.
+
+    known : what the numbers of a column say, for those whose numbers were looked at
+    """
+    clocks = {one.clock for one in columns if one.clock is not None}
+    candidates = [
+        _candidates(one, known.get(index), index in clocks) for index, one in enumerate(columns)
+    ]
+    twice = _named_twice(columns)
+    for index in twice:
+        candidates[index] = []
+    chosen = _assigned(candidates)
+    for index, one in chosen.items():
+        rivals = [
+            columns[other].name
+            for other, offered in enumerate(candidates)
+            if other not in chosen
+            and any(
+                rival.channel == one.channel and rival.confidence > one.confidence - FITS_AS_WELL
+                for rival in offered
+            )
+        ]
+        if rivals and one.channel != "time":
+            also = f"{one.reason}; {', '.join(rivals[:3])} fit{'s' * (len(rivals) == 1)} as well"
+            chosen[index] = replace(one, confidence=0.85 * one.confidence, reason=also)
+    mapping = ChannelMapping(
+        tuple(_entry(columns[index], chosen[index]) for index in sorted(chosen))
+    )
+    return Guess(
+        mapping,
+        chosen,
+        tuple(tuple(offered[:MOST_CANDIDATES]) for offered in candidates),
+        tuple(_warnings(columns, known, chosen, twice)),
+    )
+
+
+def with_template(found: Guess, columns: Sequence[Column], template: ChannelMapping) -> Guess:
+    """A guess with the mapping of a template that fits the columns in place of the guessed one."""
+    chosen = {}
+    for one in template.columns:
+        [index] = places(tuple(columns), one.column, one.group)
+        reason = "template" + (f"; {one.note}" if one.note else "")
+        chosen[index] = Candidate(one.channel, one.unit, one.sign, 1.0, reason)
+    return replace(found, mapping=template, chosen=chosen)
+
+
+def _entry(column: Column, one: Candidate) -> MappedColumn:
+    return MappedColumn(column.name, one.channel, one.unit, column.group, one.sign, note=one.reason)
+
+
+def _candidates(column: Column, known: Statistics | None, clock: bool) -> list[Candidate]:
+    """What a column may be, the likeliest first."""
+    name, unit = column.name, column.unit
+    if not unit:
+        name, unit = split_title(name)
+    stated = plain_unit(unit)
+    own = find_channel(name.strip().lower())
+    found: dict[str, tuple[float, tuple[str, ...]]] = {}
+    if own is not None:
+        found[own.name] = (1.0, ())
+    else:
+        for reading in readings(name):
+            measured = MEASURES.get(measured_by(stated or next(iter(reading.ending), "")), "")
+            # Also as if there were no unit: a header may state a wrong one.
+            for one, fit in (*fits(reading, measured), *(fits(reading, "") if stated else ())):
+                if fit > found.get(one, (0.0, ()))[0]:
+                    found[one] = (fit, reading.ending)
+    if clock and (own is None or own.name == "time"):
+        found = {"time": (1.0, ())}
+    made = [
+        _candidate(
+            channel(one), fit, taken_unit(channel(one), stated, ending, known), column, known
+        )
+        for one, (fit, ending) in found.items()
+    ]
+    likely = [one for one in made if one.confidence >= CANDIDATE]
+    return sorted(likely, key=lambda one: -one.confidence)
+
+
+def _candidate(
+    info: ChannelInfo, fit: float, unit: TakenUnit, column: Column, known: Statistics | None
+) -> Candidate:
+    confidence, reason = fit * unit.belief, unit.reason
+    if known is not None and known.constant and info.name != "time":
+        confidence, reason = NEVER_CHANGES * confidence, f"{reason}; it never changes"
+    sign, words = stated_sign(info.name, column.comment, column.name)
+    if sign < 0:
+        reason = f"{reason}; turned over, since it says {words!r}"
+    return Candidate(info.name, unit.unit, sign, round(confidence, 3), reason, unit.doubted)
+
+
+def _assigned(candidates: Sequence[Sequence[Candidate]]) -> dict[int, Candidate]:
+    """Columns with the channels they are proposed as, greatest in sum, each channel once."""
+    likely = {
+        (index, one.channel): one
+        for index, offered in enumerate(candidates)
+        for one in offered
+        if one.confidence >= THRESHOLD
+    }
+    rows = sorted({index for index, _ in likely})
+    names = sorted({name for _, name in likely})
+    if not likely:
+        return {}
+    # What is not likely gains nothing, and of equals the first column comes first.
+    gain = np.zeros((len(rows), len(names)))
+    for (index, name), one in likely.items():
+        gain[rows.index(index), names.index(name)] = one.confidence - 1e-6 * index / (1 + rows[-1])
+    chosen = {}
+    for row, column in zip(*linear_sum_assignment(gain, maximize=True), strict=True):
+        if gain[row, column] > 0.0:
+            chosen[rows[row]] = likely[rows[row], names[column]]
+    return dict(sorted(chosen.items()))
+
+
+def _named_twice(columns: Sequence[Column]) -> list[int]:
+    """Columns that cannot be told from an earlier one by group and name."""
+    seen: set[tuple[str, str]] = set()
+    twice = []
+    for index, one in enumerate(columns):
+        if (one.group, one.name) in seen:
+            twice.append(index)
+        seen.add((one.group, one.name))
+    return twice
+
+
+def _warnings(
+    columns: Sequence[Column],
+    known: Mapping[int, Statistics],
+    chosen: Mapping[int, Candidate],
+    twice: Sequence[int],
+) -> list[str]:
+    """Sentences about units that lie, stand-ins, gaps, clipping and constant columns."""
+    said = []
+    for index in twice:
+        said.append(
+            f"Column {index + 1} is called {columns[index].name} like an earlier one; it can be"
+            " mapped once one of them is renamed."
+        )
+    for index, one in chosen.items():
+        name, numbers = columns[index].name, known.get(index)
+        if "lies:" in one.reason or ", but " in one.reason:
+            said.append(f"{name} is taken as {one.channel} in {one.unit}: {one.reason}.")
+        if numbers is None:
+            continue
+        for value, samples in numbers.stand_ins:
+            said.append(
+                f"{name} is {value:g} in {samples} samples, far outside the rest; if that stands"
+                f' for nothing measured, map it with "missing": [{value:g}].'
+            )
+        if numbers.missing:
+            said.append(f"{name} has no number in {numbers.missing} of {numbers.samples} samples.")
+        for end in numbers.clipped:
+            said.append(f"{name} stays at {end:g} again and again; it is probably clipped there.")
+        if numbers.constant and one.channel != "time":
+            said.append(f"{name} never changes.")
+    return said

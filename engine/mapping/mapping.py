@@ -1,0 +1,123 @@
+"""A mapping: which column of a file is which channel, in which unit and with which sign.
+
+It is kept as JSON and used again for every file whose columns have the same names:
+
+    {"columns": [{"column": "Car.Pitch", "group": "", "channel": "chassis.pitch", "unit": "deg",
+                  "sign": -1, "gain": 1.0, "missing": [-64], "note": "name and unit"}],
+     "longest_gap": 0.1, "step": null}
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from ..channels import channel
+from ..errors import MeasurementError
+from ..formats.table import Column
+from ..json_record import RecordReader, record_to_json
+from ..json_text import read_json
+from ..units import UnitError, to_si
+from ..vehicle import Range
+
+LONGEST_GAP = 0.1
+"""Time without samples that is bridged unless told, s."""
+
+
+@dataclass(frozen=True, slots=True)
+class MappedColumn:
+    """One column of a file as a channel.
+
+    unit : what its numbers are in, whatever the file says
+    value in SI = sign * (number * gain in `unit`)
+    missing : numbers that stand for "nothing measured"; None where nobody has looked for such
+        numbers, so that they are refused where there are some
+    note : how the entry came about
+    """
+
+    column: str
+    channel: str
+    unit: str
+    group: str = ""
+    sign: int = 1
+    gain: Annotated[float, Range("1", 1e-9, 1e9)] = 1.0
+    missing: tuple[float, ...] | None = None
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse a channel, a unit or a sign that does not exist."""
+        if self.sign not in (1, -1):
+            raise MeasurementError(f"{self.channel}: the sign is {self.sign}; give 1 or -1.")
+        self.to_si()
+
+    def to_si(self) -> tuple[float, float]:
+        """Factor and offset that turn a number of the column into the channel's SI unit."""
+        info = channel(self.channel)
+        try:
+            factor, offset = to_si(self.unit, info.unit)
+        except UnitError as error:
+            raise MeasurementError(
+                f"{self.channel}: {error}; give a unit of {info.quantity} such as"
+                f" {info.display_unit}."
+            ) from error
+        return self.sign * self.gain * factor, self.sign * offset
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelMapping:
+    """Columns as channels, each channel once.
+
+    longest_gap : time between two samples, s, over which missing ones are interpolated
+    step : time between the samples of the run, s; None for that of its finest channel
+    """
+
+    columns: tuple[MappedColumn, ...]
+    longest_gap: Annotated[float, Range("s", 0.0, 10.0)] = LONGEST_GAP
+    step: Annotated[float, Range("s", 1e-5, 1.0)] | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse a channel or a column that is taken twice."""
+        channels: dict[str, str] = {}
+        columns: dict[tuple[str, str], str] = {}
+        for one in self.columns:
+            if one.channel in channels:
+                raise MeasurementError(
+                    f"columns {channels[one.channel]} and {one.column} are both {one.channel};"
+                    " keep one of them."
+                )
+            if (one.group, one.column) in columns:
+                raise MeasurementError(
+                    f"column {one.column} is both {columns[one.group, one.column]} and"
+                    f" {one.channel}; keep one of them."
+                )
+            channels[one.channel] = one.column
+            columns[one.group, one.column] = one.channel
+
+    def fits(self, columns: tuple[Column, ...]) -> bool:
+        """Whether a file has every column."""
+        return bool(self.columns) and all(
+            len(places(columns, one.column, one.group)) == 1 for one in self.columns
+        )
+
+
+def places(columns: tuple[Column, ...], name: str, group: str) -> list[int]:
+    """Where a column is in a file: in its group, else by its name alone."""
+    named = [index for index, one in enumerate(columns) if one.name == name]
+    grouped = [index for index in named if columns[index].group == group]
+    return grouped or ([] if group and len(named) > 1 else named)
+
+
+def read_mapping(path: str | Path) -> ChannelMapping:
+    """The mapping in a JSON file; every message starts with the file's name."""
+    path = Path(path)
+    return mapping_from_json(read_json(path, MeasurementError), path.name)
+
+
+def mapping_from_json(data: Any, source: str = "mapping") -> ChannelMapping:
+    """A mapping from its JSON; `source` heads every message."""
+    return RecordReader(source, MeasurementError).record(ChannelMapping, data)
+
+
+def mapping_to_json(mapping: ChannelMapping) -> Mapping[str, Any]:
+    """A mapping as JSON."""
+    return record_to_json(mapping)

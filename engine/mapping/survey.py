@@ -1,0 +1,55 @@
+"""What is in a file, before it is mapped: the numbers of its columns, and the guess."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from ..errors import MeasurementError
+from ..formats.table import Column, Table
+from .guess import Guess, guess, named_like_channels, with_template
+from .mapping import ChannelMapping
+from .numbers import Statistics, statistics
+
+MOST_SURVEYED = 25_000_000
+"""Numbers of a file up to which every column is looked at, not only those that may be channels."""
+
+
+@dataclass(frozen=True, slots=True)
+class Survey:
+    """Columns of a file, what their numbers say, and what is proposed for them.
+
+    known : by column, of those whose numbers were read
+    template : the name of the template whose mapping is proposed in place of a guess, "" for none
+    """
+
+    source: str
+    kind: str
+    columns: tuple[Column, ...]
+    known: Mapping[int, Statistics]
+    guess: Guess
+    warnings: tuple[str, ...]
+    template: str = ""
+
+    def with_templates(self, templates: Mapping[str, ChannelMapping]) -> "Survey":
+        """With the first of some templates that fits the columns in place of the guess."""
+        for name, one in templates.items():
+            if one.fits(self.columns):
+                found = with_template(self.guess, self.columns, one)
+                return replace(self, guess=found, template=name)
+        return self
+
+
+def survey(table: Table) -> Survey:
+    """What is in a table."""
+    columns = table.columns
+    clocks = {one.clock for one in columns if one.clock is not None}
+    wanted = range(len(columns))
+    if sum(one.samples for one in columns) > MOST_SURVEYED:
+        wanted = sorted({*named_like_channels(columns), *clocks})
+    known, warnings = {}, list(table.warnings)
+    for index in wanted:
+        try:
+            known[index] = statistics(table.values(index))
+        except MeasurementError as error:
+            warnings.append(str(error).removeprefix(f"{table.source}: "))
+    found = guess(columns, known)
+    return Survey(table.source, table.kind, columns, known, found, (*warnings, *found.warnings))
