@@ -88,6 +88,7 @@ def command_line() -> "Parser":
 
     _describe_serve(add("serve", _serve, "Serve the page and the REST interface."))
     _describe_simulate(add("simulate", _simulate, "Simulate a car on a road, from rims or posts."))
+    _describe_channels(add("channels", _channels, "Show which channels a recording's columns are."))
     _describe_sweep(add("sweep", _sweep, "Simulate many cars, one row a car."))
     _describe_condition(add("condition", _condition, "Make a fit's inputs of a raw recording."))
     _describe_identify(add("identify", _identify, "Identify a car's parameters from recordings."))
@@ -177,6 +178,12 @@ def _describe_simulate(command: Parser) -> None:
     command.add_argument("-o", "--output", metavar="FILE", help="the run as CSV")
 
 
+def _describe_channels(command: Parser) -> None:
+    command.add_argument("recording", metavar="FILE", help="recording of any kind and any names")
+    _add_mapping(command)
+    command.add_argument("-o", "--output", metavar="FILE", help="the mapping as JSON")
+
+
 def _describe_sweep(command: Parser) -> None:
     _add_excitation(command)
     several = {"nargs": "+", "action": "extend", "default": []}
@@ -253,7 +260,8 @@ def _describe_validate(command: Parser) -> None:
 
 def _add_identification(command: Parser) -> None:
     """Recordings, a car, and what is identified how."""
-    command.add_argument("runs", metavar="RUN", nargs="+", help="recording, CSV")
+    command.add_argument("runs", metavar="RUN", nargs="+", help="recording")
+    _add_mapping(command)
     _add_vehicle(command)
     several = {"nargs": "+", "action": "extend", "default": []}
     command.add_argument("--free", metavar="NAME", **several, help="identify these alone")
@@ -335,6 +343,7 @@ def _add_excitation(command: Parser) -> None:
     drive.add_argument("--manoeuvre", metavar="NAME", help="1, 2, another known one, or a file")
     drive.add_argument("--rims", metavar="RUN", help="recording whose rims and a_x drive the car")
     drive.add_argument("--posts", metavar="RUN", help="recording of a four-post rig's post.*.z")
+    _add_mapping(command)
     command.add_argument("--road", metavar="FILE", help="road file in place of the manoeuvre's")
     command.add_argument("--duration", metavar="S", type=float, help="in place of the manoeuvre's")
     command.add_argument("--lift-off", action="store_true", help="no tyre pulls at the road")
@@ -383,6 +392,12 @@ def _add_noise(command: Parser, what: str) -> None:
     command.add_argument("--noise", metavar="FILE", help=f"{what}, TOML with a [noise] table")
 
 
+def _add_mapping(command: Parser) -> None:
+    command.add_argument(
+        "--mapping", metavar="FILE", help="which columns are which channels; see ridetune channels"
+    )
+
+
 def _seed(text: str) -> int:
     seed = int(text) if text.isdecimal() else -1
     if not 0 <= seed <= LARGEST_SEED:
@@ -401,6 +416,12 @@ def _simulate(options: argparse.Namespace) -> None:
     from .commands.simulate import simulate
 
     simulate(options)
+
+
+def _channels(options: argparse.Namespace) -> None:
+    from .commands.channels import channels
+
+    channels(options)
 
 
 def _sweep(options: argparse.Namespace) -> None:

@@ -29,6 +29,10 @@ class MeasurementError(RideError):
     code = "measurement"
 
 
+class UnmappedError(MeasurementError):
+    """A measurement file's columns have other names than our channels; a mapping tells them."""
+
+
 class ConditioningError(RideError):
     """A step of conditioning cannot be done to a recording as asked."""
 

@@ -26,7 +26,7 @@ from .channels import (
 )
 from .clocks import clocks_of, on_one_clock
 from .csv_table import is_number, split_title
-from .errors import MeasurementError
+from .errors import MeasurementError, UnmappedError
 from .formats.kinds import CSV
 from .formats.opening import opened, opened_bytes
 from .formats.table import Table
@@ -215,9 +215,9 @@ def _columns(table: Table) -> tuple[list[Chosen], list[str]]:
             )
         else:
             found[info.name] = _column(index, info, unit, source)
+    _require_channels(table, found)
     for index, title in others:
         _refuse_misspelling(index, title, found, source)
-    _require_channels(table, found)
     warnings = []
     if bare := [f"{name} in {one.info.unit}" for name, one in found.items() if not one.unit]:
         warnings.append(f"Columns without a unit were read as SI: {', '.join(bare)}.")
@@ -242,15 +242,15 @@ def _column(index: int, info: ChannelInfo, unit: str, source: str) -> Chosen:
 
 
 def _require_channels(table: Table, found: Collection[str]) -> None:
-    """Refuse a file without time or without any channel."""
+    """Refuse a file without time or without any channel: its names are not ours."""
     if table.kind == CSV and "time" not in found:
         listed = ", ".join(_shortened(_titled(*title)) for title in table.titles()[:5])
-        raise MeasurementError(
+        raise UnmappedError(
             f"{table.source}: no column is called time (the first line reads: {listed}); name the"
             " columns on the first line, such as time [s],chassis.z [mm]."
         )
     if not set(found) - {"time"}:
-        raise MeasurementError(
+        raise UnmappedError(
             f"{table.source}: no column besides time is a known channel; name them like"
             " chassis.z [mm],wheel.fl.z [mm]."
         )

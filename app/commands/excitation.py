@@ -7,13 +7,12 @@ from typing import Any, Literal
 
 from ...engine.errors import SimulationError
 from ...engine.excitation import Excitation, FreeExcitation, RimsExcitation
-from ...engine.measurement import read_run
 from ...engine.recorded_motion import recorded_motion
 from ...engine.road_file import read_road
 from ...engine.road_specs import IsoRoad
 from ...engine.vehicle import Vehicle
 from .arguments import rims_settings
-from .inputs import find_manoeuvre, read_runs, recording_files
+from .inputs import find_manoeuvre, find_mapping, read_one, read_runs, recording_files
 
 Mode = Literal["manoeuvre", "rims", "posts"]
 MODES: tuple[Mode, ...] = ("manoeuvre", "rims", "posts")
@@ -38,6 +37,8 @@ def mode_of(options: Namespace) -> Mode:
         if getattr(options, option) is not None and home != f"--{mode}":
             shown = {"road_seed": "seed"}.get(option, option).replace("_", "-")
             raise SimulationError(f"--{shown} belongs to {home}; it means nothing with --{mode}.")
+    if options.mapping is not None and mode == "manoeuvre":
+        raise SimulationError("--mapping belongs to a recording; leave it out of --manoeuvre.")
     if options.lift_off and mode == "rims":
         raise SimulationError("--lift-off means nothing with --rims, where tyres play no part.")
     return mode
@@ -46,18 +47,18 @@ def mode_of(options: Namespace) -> Mode:
 def files_read(options: Namespace) -> tuple[str | Path | None, ...]:
     """All that is read, None for what is not told and a key for what comes along."""
     recordings = recording_files(filter(None, (options.rims, options.posts)))
-    return (options.vehicle, options.manoeuvre, options.road, *recordings)
+    return (options.vehicle, options.manoeuvre, options.road, options.mapping, *recordings)
 
 
 def excitation(options: Namespace, mode: Mode, vehicle: Vehicle) -> Excitation:
     """What the options let the car go through."""
     if mode == "rims":
-        [run] = read_runs([options.rims], options.braking or ())
+        [run] = read_runs([options.rims], options.braking or (), find_mapping(options.mapping))
         motion = recorded_motion(run, rims_settings(options))
         return RimsExcitation(motion, options.traction or "exact")
     how: dict[str, Any] = {"lift_off": options.lift_off, "step": options.step}
     if mode == "posts":
-        return FreeExcitation(read_run(options.posts), **how)
+        return FreeExcitation(read_one(options.posts, find_mapping(options.mapping)), **how)
     manoeuvre = find_manoeuvre(options.manoeuvre)
     if options.duration is not None:
         manoeuvre = manoeuvre.lasting(options.duration)

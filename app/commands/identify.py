@@ -14,7 +14,7 @@ from ...engine.parameters import DAMPER_NAMES, PARAMETER_NAMES, parameter
 from ...engine.problem import Problem
 from ...engine.vehicle import Vehicle
 from .arguments import bounds, loss, priors, rims_settings, starts, whole
-from .inputs import find_vehicle, read_noise, read_runs, recording_files
+from .inputs import find_mapping, find_vehicle, read_noise, read_runs, recording_files
 from .output import (
     print_fit_percent,
     print_table,
@@ -27,11 +27,12 @@ from .output import (
 
 def identify(options: Namespace) -> None:
     """Fit the free parameters to all runs at once, print the report, write the fit."""
-    inputs = (options.vehicle, options.noise, *recording_files(options.runs))
+    inputs = (options.vehicle, options.noise, options.mapping, *recording_files(options.runs))
     require_place(options.output, inputs)
     noise = read_noise(options.noise)
     vehicle = find_vehicle(options.vehicle)
-    runs = read_runs(options.runs, options.braking or (), noise=noise)
+    mapping = find_mapping(options.mapping)
+    runs = read_runs(options.runs, options.braking or (), mapping, noise=noise)
     fit = fitted(options, vehicle, runs)
     print_fit(fit)
     if options.output:

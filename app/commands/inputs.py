@@ -7,9 +7,16 @@ from pathlib import Path
 from typing import TypeVar
 
 from ...engine.channels import Run
-from ...engine.errors import ManoeuvreError, MeasurementError, RideError, VehicleError
+from ...engine.errors import (
+    ManoeuvreError,
+    MeasurementError,
+    RideError,
+    UnmappedError,
+    VehicleError,
+)
 from ...engine.manoeuvre import Manoeuvre, read_manoeuvre, reference_manoeuvres
-from ...engine.measurement import read_run
+from ...engine.mapping.mapping import ChannelMapping, read_mapping
+from ...engine.mapping.reading import read_recording
 from ...engine.run_notes import notes_beside, read_notes
 from ...engine.vehicle import Vehicle
 from ...engine.vehicle_file import read_vehicle, reference_vehicles
@@ -45,12 +52,36 @@ def _known(name: str, known: Mapping[str, Known], kind: type[RideError], noun: s
     raise kind(f"{name}: there is no such file, nor a {noun} of that name; {hint}")
 
 
+def find_mapping(path: str | None) -> ChannelMapping | None:
+    """The mapping in a file, if there is a file."""
+    return None if path is None else read_mapping(path)
+
+
+def read_one(
+    path: str, mapping: ChannelMapping | None, *, noise: Mapping[str, float] | None = None
+) -> Run:
+    """A recording under a mapping, or by our own names; one of other names is told the way."""
+    try:
+        return read_recording(path, mapping, noise=noise)
+    except UnmappedError as error:
+        raise UnmappedError(
+            f"{str(error).rstrip('.')}, or run `ridetune channels {path} -o mapping.json`, look at"
+            " what it takes for what, and add --mapping mapping.json."
+        ) from error
+
+
 def read_runs(
-    paths: Sequence[str], marks: Iterable[str], *, noise: Mapping[str, float] | None = None
+    paths: Sequence[str],
+    marks: Iterable[str],
+    mapping: ChannelMapping | None = None,
+    *,
+    noise: Mapping[str, float] | None = None,
 ) -> list[Run]:
-    """The recordings, with their braking where a mark tells it; `noise` as of `read_run`."""
+    """The recordings, with their braking where a mark tells it; `mapping`, `noise` as of
+    `read_recording`.
+    """
     marked = braking(marks, paths)
-    runs = [read_run(path, noise=noise) for path in paths]
+    runs = [read_one(path, mapping, noise=noise) for path in paths]
     return [
         replace(run, braking=marked[place]) if place in marked else run
         for place, run in enumerate(runs)

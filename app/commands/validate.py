@@ -24,7 +24,14 @@ from ...engine.validation_file import validation_to_json
 from ..report import made, report
 from .arguments import ArgumentError, place_of, rims_settings
 from .identify import fitted, print_fit
-from .inputs import find_manoeuvre, find_vehicle, read_noise, read_runs, recording_files
+from .inputs import (
+    find_manoeuvre,
+    find_mapping,
+    find_vehicle,
+    read_noise,
+    read_runs,
+    recording_files,
+)
 from .output import print_table, print_warnings, require_place, write_file
 
 DRIVEN_BY = {"rims": "rims", "road": "road + torque"}
@@ -37,7 +44,8 @@ def validate(options: Namespace) -> None:
     _require_places(options, paths)
     geometry = _geometry(options.geometry)
     vehicle = find_vehicle(options.vehicle)
-    runs = read_runs(paths, options.braking or (), noise=read_noise(options.noise))
+    mapping, noise = find_mapping(options.mapping), read_noise(options.noise)
+    runs = read_runs(paths, options.braking or (), mapping, noise=noise)
     cases = _cases(runs, len(options.runs), _manoeuvres(options.manoeuvre, paths))
     check_cases(cases)
     fit = fitted(options, vehicle, runs[: len(options.runs)])
@@ -66,7 +74,7 @@ def _require_places(options: Namespace, paths: Sequence[str]) -> None:
     """Refuse places that cannot be written before the work is done."""
     beside = [manoeuvre_beside(Path(path)) for path in paths]
     inputs = (
-        *(options.vehicle, options.noise, options.geometry),
+        *(options.vehicle, options.noise, options.mapping, options.geometry),
         *recording_files(paths),
         *beside,
         *(text.partition("=")[2] for text in options.manoeuvre),

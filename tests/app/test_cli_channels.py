@@ -1,0 +1,121 @@
+"""`ridetune channels` and --mapping. Oracle: a sample run under other names and in other units."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from ridetune.app.cli import main
+from ridetune.engine.mapping.mapping import read_mapping
+from ridetune.engine.mapping.reading import read_recording
+from ridetune.engine.measurement import read_run
+
+from .conftest import SAMPLES
+from .test_cli import refused
+
+NATIVE = SAMPLES / "twin/manoeuvre_2.csv"
+TITLES = {
+    "time": ("Zeit [ms]", 1e3),
+    "chassis.z": ("Aufbauhub [mm]", 1e3),
+    "chassis.pitch": ("Nickwinkel [rad]", 180.0 / np.pi),
+    "chassis.a_x": ("acc_x_g", 1e3 / 9.80665),
+    **{
+        f"wheel.{corner}.z": (f"Radweg {word} [mm]", 1e3)
+        for corner, word in zip(("fl", "fr", "rl", "rr"), ("VL", "VR", "HL", "HR"), strict=True)
+    },
+}
+"""By channel another title, and what its numbers are multiplied by: pitch and a_x lie."""
+
+
+@pytest.fixture
+def foreign(tmp_path, monkeypatch):
+    """The sample run as another house writes it, its pitch turned over."""
+    monkeypatch.chdir(tmp_path)
+    run = read_run(NATIVE)
+    table = [factor * run[name] for name, (_, factor) in TITLES.items()]
+    table[2] = -table[2]
+    titles = [title for title, _ in TITLES.values()]
+    np.savetxt(
+        "foreign.csv", np.transpose(table), "%.12g", ";", header=";".join(titles), comments=""
+    )
+    return tmp_path / "foreign.csv"
+
+
+def test_the_columns_are_shown_with_what_they_are_taken_for_and_why(foreign, capsys):
+    assert main(["channels", "foreign.csv", "-o", "mapping.json"]) == 0
+    printed = capsys.readouterr().out
+    assert printed.startswith("foreign.csv: CSV, 8 columns\n")
+    [pitch] = [line for line in printed.splitlines() if line.startswith("Nickwinkel")]
+    assert re.search(r"rad .* chassis.pitch +deg +\+1 .* unit lies: .* fit deg, not rad", pitch)
+    assert "Warning: chassis.pitch runs against the pitch of the wheels" in printed
+    assert "Wrote mapping.json: look through it" in printed
+    taken = {one.channel: one.unit for one in read_mapping("mapping.json").columns}
+    assert taken["chassis.a_x"] == "mg"
+    assert set(taken) == set(TITLES)
+
+
+def test_a_mapping_makes_a_foreign_recording_one_of_ours(foreign, capsys):
+    """Once pitch is turned back, every number is that of the sample, to the digits written."""
+    main(["channels", "foreign.csv", "-o", "mapping.json"])
+    mapping = json.loads((foreign.parent / "mapping.json").read_text())
+    next(one for one in mapping["columns"] if one["channel"] == "chassis.pitch")["sign"] = -1
+    (foreign.parent / "mapping.json").write_text(json.dumps(mapping))
+    found, native = read_recording(foreign, read_mapping("mapping.json")), read_run(NATIVE)
+    for name in TITLES:
+        np.testing.assert_allclose(found[name], native[name], rtol=1e-10, atol=1e-12)
+    capsys.readouterr()
+    main(["channels", "foreign.csv", "--mapping", "mapping.json"])
+    assert "Warning" not in capsys.readouterr().out
+
+    simulate = ["simulate", "--vehicle", "paper", "--rims"]
+    assert main([*simulate, "foreign.csv", "--mapping", "mapping.json"]) == 0
+    mapped = capsys.readouterr().out
+    main([*simulate, str(NATIVE)])
+    ours = capsys.readouterr().out
+    shown = [re.findall(r"^(chassis.(?:z|pitch)) +(\S+)$", one, re.M) for one in (mapped, ours)]
+    assert shown[0] == shown[1]
+    assert len(shown[0]) == 2
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["identify", "foreign.csv", "--vehicle", "paper"],
+        ["simulate", "--vehicle", "paper", "--rims", "foreign.csv"],
+        ["simulate", "--vehicle", "paper", "--posts", "foreign.csv", "-o", "x.csv"],
+        ["validate", "foreign.csv", "--vehicle", "paper", "-o", "report.html"],
+    ],
+)
+def test_other_names_without_a_mapping_are_refused_with_the_way(foreign, capsys, command):
+    said = refused(capsys, *command)
+    assert "foreign.csv: no column is called time" in said
+    assert "run `ridetune channels foreign.csv -o mapping.json`" in said
+    assert said.endswith("and add --mapping mapping.json.")
+
+
+def test_what_makes_no_sense_with_a_mapping_is_refused(foreign, capsys):
+    main(["channels", "foreign.csv", "-o", "mapping.json"])
+    capsys.readouterr()
+    command = ["simulate", "--vehicle", "paper", "--manoeuvre", "2", "-o", "x.csv"]
+    said = refused(capsys, *command, "--mapping", "mapping.json")
+    assert "--mapping belongs to a recording" in said
+    said = refused(capsys, "channels", str(NATIVE), "--mapping", "mapping.json")
+    assert "manoeuvre_2.csv: the file has no column called 'Zeit'" in said
+    assert "nowhere.json: cannot be read" in refused(
+        capsys, "channels", "foreign.csv", "--mapping", "nowhere.json"
+    )
+    assert "nowhere.csv: the file cannot be read" in refused(capsys, "channels", "nowhere.csv")
+    said = refused(capsys, "channels", "foreign.csv", "-o", "foreign.csv")
+    assert "which the command reads" in said
+
+
+def test_what_cannot_be_applied_yet_is_said_with_the_guess(foreign, capsys):
+    lines = foreign.read_text().splitlines()
+    for row in range(100, 105):
+        cells = lines[row].split(";")
+        lines[row] = ";".join([cells[0], "-9999", *cells[2:]])
+    foreign.write_text("\n".join(lines))
+    assert main(["channels", "foreign.csv"]) == 0
+    printed = capsys.readouterr().out
+    assert "Warning: Aufbauhub is -9999 in 5 samples, far outside the rest" in printed
+    assert 'map it with "missing": [-9999], else with "missing": []' in printed
