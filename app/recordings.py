@@ -1,28 +1,35 @@
 """Measurement files as runs: parsed once, kept in memory while they are in use, summed up.
 
-The original on disk stays the truth; a run here can always be read again from it, and the motion
-that it prescribes to every car made again.
+The original on disk stays the truth; a run here can always be read again from it under its mapping,
+and the motion that it prescribes to every car made again. A file whose columns have names of their
+own is kept, too, and is no run until it has a mapping.
 """
 
 import json
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..engine.channels import Run, channel
-from ..engine.errors import MeasurementError
+from ..engine.errors import MeasurementError, UnmappedError
 from ..engine.remembered import Remembered
 from ..engine.rims_settings import RimsSettings
 from ..engine.run_notes import doubtful_noise
 from .store import Measurement, NewMeasurement, Store
 
 if TYPE_CHECKING:
+    from ..engine.formats.table import Table
+    from ..engine.mapping.survey import Survey
     from ..engine.recorded_motion import RecordedMotion
 
 REMEMBERED_VALUES = 8_000_000
 """Numbers kept in memory over all runs, and as many over all motions: 64 MB."""
+
+REMEMBERED_COLUMNS = 20_000
+"""Columns of surveys kept in memory, some kB each."""
 
 
 class Recordings:
@@ -30,8 +37,9 @@ class Recordings:
 
     def __init__(self, store: Store):
         self._store = store
-        self._runs: Remembered[str, Run] = Remembered(REMEMBERED_VALUES)
+        self._runs: Remembered[Any, Run] = Remembered(REMEMBERED_VALUES)
         self._conditioned: Remembered[Any, Run] = Remembered(REMEMBERED_VALUES)
+        self._surveys: Remembered[Any, Survey] = Remembered(REMEMBERED_COLUMNS)
         self._motions: Remembered[Any, RecordedMotion] = Remembered(REMEMBERED_VALUES)
 
     def run(self, measurement: Measurement) -> Run:
@@ -52,11 +60,19 @@ class Recordings:
         return run
 
     def raw(self, measurement: Measurement) -> Run:
-        """The parsed recording under the measurement's name, with its noise."""
-        run = self._runs.get(measurement.sha256)
+        """The parsed recording under the measurement's name and mapping, with its noise;
+        `UnmappedError` where it needs a mapping and has none.
+        """
+        if measurement.summary.get("needs_mapping"):
+            raise UnmappedError(
+                f"{measurement.name}: its columns are not mapped to channels; map them first."
+            )
+        key = _key(measurement)
+        run = self._runs.get(key)
         if run is None:
-            run = parse(self._store.original(measurement).read_bytes(), measurement.name)
-            self._runs.keep(measurement.sha256, run, len(run.time) * (1 + len(run.columns)))
+            data = self._store.original(measurement).read_bytes()
+            run = parse(data, measurement.name, mapping=measurement.mapping)
+            self._runs.keep(key, run, len(run.time) * (1 + len(run.columns)))
         return replace(
             run,
             name=measurement.name,
@@ -86,6 +102,28 @@ class Recordings:
             self._motions.keep(key, motion, motion.stage_inputs.size)
         return replace(motion, run=run)
 
+    def survey(self, measurement: Measurement) -> "Survey":
+        """What is in the file, whether it has a mapping or not."""
+        key = measurement.sha256, measurement.name
+        found = self._surveys.get(key)
+        if found is None:
+            found = survey(self._store.original(measurement).read_bytes(), measurement.name)
+            self._surveys.keep(key, found, len(found.columns))
+        return found
+
+    @contextmanager
+    def table(self, measurement: Measurement) -> "Iterator[Table]":
+        """The file as a table, for as long as the `with` lasts."""
+        from ..engine.formats.opening import opened
+
+        with opened(self._store.original(measurement), measurement.name, apart=True) as table:
+            yield table
+
+
+def _key(measurement: Measurement) -> tuple[str, str]:
+    """What a parsed recording is made of."""
+    return measurement.sha256, json.dumps(measurement.mapping, sort_keys=True)
+
 
 def _done_to(measurement: Measurement) -> tuple[Any, ...]:
     """What stands for a measurement's file and what is done to it."""
@@ -93,7 +131,7 @@ def _done_to(measurement: Measurement) -> tuple[Any, ...]:
     if measurement.conditioning is not None:
         text = json.dumps(measurement.conditioning, sort_keys=True)
         done = (text, *sorted(measurement.noise.items()))
-    return measurement.sha256, measurement.name, *done
+    return *_key(measurement), measurement.name, *done
 
 
 def stated(measurement: Measurement) -> dict[str, Any]:
@@ -102,26 +140,43 @@ def stated(measurement: Measurement) -> dict[str, Any]:
         "id": measurement.id,
         "name": measurement.name,
         "noise": measurement.noise,
+        "mapping": measurement.mapping,
         "conditioning": measurement.conditioning,
     }
 
 
 def as_stated(measurement: Measurement, kept: Mapping[str, Any]) -> Measurement:
     """The measurement as it was when a job kept that of it."""
-    # Jobs of an earlier service say nothing of conditioning, and its sweeps nothing of noise.
-    noise = kept.get("noise", measurement.noise)
-    return replace(measurement, noise=noise, conditioning=kept.get("conditioning"))
+    # Jobs of an earlier service say nothing of these, and its sweeps nothing of noise.
+    return replace(
+        measurement,
+        noise=kept.get("noise", measurement.noise),
+        mapping=kept.get("mapping"),
+        conditioning=kept.get("conditioning"),
+    )
 
 
-def parse(data: bytes, name: str, noise: Mapping[str, float] | None = None) -> Run:
+def parse(
+    data: bytes,
+    name: str,
+    noise: Mapping[str, float] | None = None,
+    mapping: Mapping[str, Any] | None = None,
+) -> Run:
     """Read a measurement file; MeasurementError says what is wrong with it and where.
 
     noise : standard deviations in SI by channel, which are stated beside the file
+    mapping : as JSON, which columns are which channels; None for those with our names
     """
     from ..engine.measurement import parse_run
 
     try:
-        return parse_run(data, name, noise=noise, apart=True)
+        if mapping is None:
+            return parse_run(data, name, noise=noise, apart=True)
+        # The mapping brings scipy.
+        from ..engine.mapping.mapping import mapping_from_json
+        from ..engine.mapping.reading import parse_recording
+
+        return parse_recording(data, name, mapping_from_json(mapping), noise=noise)
     except (RecursionError, MemoryError, OverflowError) as error:
         raise MeasurementError(
             f"{name}: the file is too large or too deep to read ({type(error).__name__}); "
@@ -134,9 +189,24 @@ def parse(data: bytes, name: str, noise: Mapping[str, float] | None = None) -> R
 
 
 def recorded(data: bytes, name: str, noise: Mapping[str, float] | None = None) -> NewMeasurement:
-    """A measurement file as it is kept; arguments and errors as of `parse`."""
-    run = parse(data, name, noise)
+    """A measurement file as it is kept; arguments and errors as of `parse`.
+
+    One with names of its own is kept as a file that needs a mapping.
+    """
+    try:
+        run = parse(data, name, noise)
+    except UnmappedError as error:
+        return NewMeasurement(name, data, unmapped_summary(survey(data, name), error), noise or {})
     return NewMeasurement(name, data, summary(run), dict(run.noise))
+
+
+def survey(data: bytes, name: str) -> "Survey":
+    """What is in the bytes of a file that a stranger sent."""
+    from ..engine.formats.opening import opened_bytes
+    from ..engine.mapping.survey import survey as of_table
+
+    with opened_bytes(data, name, apart=True) as table:
+        return of_table(table)
 
 
 def with_braking(run: Run, intervals: Iterable[tuple[float, float]] | None) -> Run:
@@ -144,12 +214,21 @@ def with_braking(run: Run, intervals: Iterable[tuple[float, float]] | None) -> R
     return run if intervals is None else replace(run, braking=tuple(map(tuple, intervals)))
 
 
-def summary(run: Run) -> dict[str, Any]:
-    """What a person wants to know of a recording before using it."""
+def summary(run: Run, *, mapped: bool = False) -> dict[str, Any]:
+    """What a person wants to know of a recording before using it.
+
+    mapped : whether its columns are mapped, so that its signs are looked at
+    """
     from ..engine.measurement import missing_for_identification
 
     missing = list(missing_for_identification(run))
+    suggestions = []
+    if mapped:
+        from ..engine.mapping.signs import check_signs
+
+        suggestions = [asdict(one) for one in check_signs(run)]
     return {
+        "needs_mapping": False,
         "samples": len(run.time),
         "duration": run.duration,
         "sample_step": run.sample_step,
@@ -157,6 +236,26 @@ def summary(run: Run) -> dict[str, Any]:
         "warnings": list(run.warnings),
         "usable_for_identification": not missing,
         "missing": missing,
+        "sign_suggestions": suggestions,
+    }
+
+
+def unmapped_summary(found: "Survey", reason: MeasurementError) -> dict[str, Any]:
+    """The same of a file that needs a mapping: what is missing is missing in the guess, too."""
+    from ..engine.measurement import missing_for_identification
+
+    nothing = np.arange(2.0)
+    guessed = {one.channel: nothing for one in found.guess.mapping.columns if one.channel != "time"}
+    return {
+        "needs_mapping": True,
+        "samples": max(one.samples for one in found.columns),
+        "duration": 0.0,
+        "sample_step": 0.0,
+        "channels": [],
+        "warnings": [str(reason), *found.warnings],
+        "usable_for_identification": False,
+        "missing": list(missing_for_identification(Run(found.source, nothing, guessed))),
+        "sign_suggestions": [],
     }
 
 

@@ -42,6 +42,9 @@ def measurement_to_json(kept: Measurement) -> dict[str, Any]:
         "noise": kept.noise,
         "manoeuvre": kept.manoeuvre,
         "conditioning": kept.conditioning and kept.conditioning["steps"],
+        "mapping": kept.mapping,
+        "needs_mapping": False,
+        "sign_suggestions": [],
         **kept.summary,
     }
 
@@ -126,8 +129,13 @@ def _note(services: Services, sid: str, kept: Measurement, received: Upload) -> 
             f"{received.name} states no noise of {', '.join(OUTPUT_CHANNELS)}; write [noise] and "
             'below it lines such as "chassis.z" = 0.0005, in SI.'
         )
-    known = parse(services.store.original(kept).read_bytes(), kept.name, noise).noise
-    found = summary(services.recordings.run(replace(kept, noise=dict(known))))
+    if kept.summary.get("needs_mapping"):
+        return services.store.set_noise(sid, kept.id, noise, kept.summary)
+    data = services.store.original(kept).read_bytes()
+    known = dict(parse(data, kept.name, noise, kept.mapping).noise)
+    found = summary(
+        services.recordings.run(replace(kept, noise=known)), mapped=kept.mapping is not None
+    )
     return services.store.set_noise(sid, kept.id, known, found)
 
 

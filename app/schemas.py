@@ -237,6 +237,13 @@ class ConditioningRequest(WireForm):
     vehicle: JsonObject | None = None
 
 
+class NamedMapping(WireForm):
+    """A mapping to be kept for the next files whose columns are the same."""
+
+    name: Name
+    mapping: JsonObject
+
+
 class StartValues(WireForm):
     """Where parameters start, SI, by name."""
 

@@ -22,8 +22,9 @@ from .data_directory import DataDirectory
 from .database import Database
 from .errors import Busy, Conflict, NotFound, Unavailable
 from .job_store import JobStore
+from .mapping_store import MappingStore
 from .settings import Limits
-from .tables import job_files, jobs, measurements, sessions, uploads
+from .tables import job_files, jobs, mappings, measurements, sessions, uploads
 
 SEEN_EVERY = 60.0
 UNUSED_AFTER = 3600.0
@@ -44,6 +45,7 @@ class Measurement:
 
     summary : what was found in it
     manoeuvre : what was driven
+    mapping : which of its columns are which channels where their names do not say it
     conditioning : what is done to it before it is used, {"steps": [...], "vehicle": {...} or None}
     """
 
@@ -56,6 +58,7 @@ class Measurement:
     noise: dict[str, float]
     summary: dict[str, Any]
     manoeuvre: dict[str, Any] | None
+    mapping: dict[str, Any] | None
     conditioning: dict[str, Any] | None
 
 
@@ -83,6 +86,7 @@ class Store:
             self.directory.close()
             raise
         self.jobs = JobStore(self.database, limits)
+        self.mappings = MappingStore(self.database, self._require_room)
         self._seen: dict[str, float] = {}
         self._originals = threading.Lock()
         with self.database.reading() as connection:
@@ -234,13 +238,19 @@ class Store:
             measurements.c.session == session
         )
         made = size.select_from(jobs.join(job_files).join(uploads)).where(jobs.c.session == session)
-        texts = (
-            select(func.coalesce(func.sum(func.length(column)), 0)).where(
-                measurements.c.session == session
-            )
-            for column in (measurements.c.manoeuvre, measurements.c.conditioning)
+        columns = (
+            measurements.c.manoeuvre,
+            measurements.c.mapping,
+            measurements.c.conditioning,
+            mappings.c.body,
         )
-        total = sum(connection.execute(part).scalar_one() for part in (measured, made, *texts))
+        told = (
+            select(func.coalesce(func.sum(func.length(column)), 0)).where(
+                column.table.c.session == session
+            )
+            for column in columns
+        )
+        total = sum(connection.execute(part).scalar_one() for part in (measured, made, *told))
         if total + more > self.limits.session_bytes:
             raise Busy(
                 f"The session's measurements and sweeps would exceed "
@@ -302,6 +312,28 @@ class Store:
             summary=json.dumps(dict(summary)),
         )
 
+    def set_mapping(
+        self,
+        session: str,
+        measurement: str,
+        mapping: Mapping[str, Any] | None,
+        noise: Mapping[str, float],
+        summary: Mapping[str, Any],
+    ) -> Measurement:
+        """Keep which columns of a measurement are which channels, and what is found in it by that;
+        `Conflict` while an unfinished job reads it, `Busy` as of files.
+        """
+        self.require_unused(session, measurement)
+        text = _optional(mapping)
+        return self._set_of(
+            session,
+            measurement,
+            more=len(text or ""),
+            mapping=text,
+            noise=json.dumps(dict(noise)),
+            summary=json.dumps(dict(summary)),
+        )
+
     def _set_of(
         self, session: str, measurement: str, *, more: int = 0, **values: Any
     ) -> Measurement:
@@ -320,14 +352,18 @@ class Store:
         """Place of a measurement's original file."""
         return self.directory.original(measurement.sha256)
 
-    def delete_measurement(self, session: str, measurement: str) -> None:
-        """Remove a measurement; `Conflict` while an unfinished job reads it."""
+    def require_unused(self, session: str, measurement: str) -> None:
+        """`Conflict` while an unfinished job reads a measurement, `NotFound` without it."""
         for job in self.jobs.unfinished(session):
             if measurement in job.measurements:
                 raise Conflict(
                     f"The {job.kind} {job.id} is still using this measurement; cancel it first."
                 )
         self.measurement(session, measurement)
+
+    def delete_measurement(self, session: str, measurement: str) -> None:
+        """Remove a measurement; `Conflict` while an unfinished job reads it."""
+        self.require_unused(session, measurement)
         with self._originals:
             with self.database.writing() as connection:
                 connection.execute(
@@ -398,6 +434,7 @@ def _measurement(row: Row[Any]) -> Measurement:
         noise=json.loads(row.noise),
         summary=json.loads(row.summary),
         manoeuvre=row.manoeuvre and json.loads(row.manoeuvre),
+        mapping=row.mapping and json.loads(row.mapping),
         conditioning=row.conditioning and json.loads(row.conditioning),
     )
 

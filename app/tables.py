@@ -21,7 +21,10 @@ from sqlalchemy import (
 MIGRATIONS: tuple[tuple[str, ...], ...] = (
     (),  # Tables that a version lacks are made anyway: here the files of jobs.
     ("ALTER TABLE measurements ADD COLUMN manoeuvre TEXT",),
-    ("ALTER TABLE measurements ADD COLUMN conditioning TEXT",),
+    (
+        "ALTER TABLE measurements ADD COLUMN mapping TEXT",
+        "ALTER TABLE measurements ADD COLUMN conditioning TEXT",
+    ),
 )
 """What leads from each version of the schema, the first being 1, to the next."""
 
@@ -70,7 +73,17 @@ measurements = Table(
     Column("noise", Text, nullable=False, default="{}"),
     Column("summary", Text, nullable=False),
     Column("manoeuvre", Text),
+    Column("mapping", Text),
     Column("conditioning", Text),
+)
+
+mappings = Table(
+    "mappings",
+    metadata,
+    Column("session", String(32), ForeignKey("sessions.id", ondelete="CASCADE"), primary_key=True),
+    Column("name", String(100), primary_key=True),
+    Column("body", Text, nullable=False),
+    Column("created", Float, nullable=False),
 )
 
 jobs = Table(

@@ -68,10 +68,13 @@ UNITS: Mapping[str, tuple[str, ...]] = {
     "N": ("N", "kN"),
     "N m": ("N m", "kN m"),
 }
-"""Units that numbers of each SI unit may be in, the usual ones first."""
+"""Units that numbers of each SI unit may be in, the two usual ones first."""
 
 ALTERNATIVE = 2.0
 """Natural logarithm of sizes within which a second unit fits as well as the best one."""
+
+RARE = 2.5
+"""What the third unit of a list and later ones must be nearer by."""
 
 _SPELLINGS = {
     "grad": "deg",
@@ -188,8 +191,8 @@ def _likely_units(info: ChannelInfo, size: Size, number: float) -> list[str]:
     and those that are hardly further from it.
     """
     away = {
-        unit: abs(math.log(number * _scale(unit, info.unit) / size.typical))
-        for unit in UNITS.get(info.unit, (info.unit,))
+        unit: abs(math.log(number * _scale(unit, info.unit) / size.typical)) + RARE * (place > 1)
+        for place, unit in enumerate(UNITS.get(info.unit, (info.unit,)))
         if size.least <= number * _scale(unit, info.unit) <= size.most
     }
     nearest = min(away.values(), default=0.0)

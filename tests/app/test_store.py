@@ -99,14 +99,16 @@ def test_a_database_of_another_version_is_refused(tmp_path):
 
 @pytest.mark.parametrize("version", [1, 2, 3])
 def test_a_database_of_an_earlier_version_is_taken_over(tmp_path, version):
-    """Oracle: what it kept; afterwards it keeps files of jobs, manoeuvres and steps."""
+    """Oracle: what it kept; afterwards it keeps all that is new since like any other."""
     store = Store(tmp_path, Limits())
     session, _ = store.create_session(CAR, [recording()])
     done, job = queued(store, session), queued(store, session)
     store.jobs.finish(done, "done", result={"cost": 1.5})
     store.close()
     with sqlite3.connect(tmp_path / "ridetune.sqlite") as connection:
-        connection.execute("ALTER TABLE measurements DROP COLUMN conditioning")
+        for column in ("mapping", "conditioning"):
+            connection.execute(f"ALTER TABLE measurements DROP COLUMN {column}")
+        connection.execute("DROP TABLE mappings")
         if version < 3:
             connection.execute("ALTER TABLE measurements DROP COLUMN manoeuvre")
         if version == 1:
@@ -116,7 +118,9 @@ def test_a_database_of_an_earlier_version_is_taken_over(tmp_path, version):
     store = Store(tmp_path, Limits())
     assert store.jobs.get(session, done).result == {"cost": 1.5}
     [kept] = store.measurements(session)
-    assert (kept.manoeuvre, kept.conditioning) == (None, None)
+    assert (kept.manoeuvre, kept.mapping, kept.conditioning) == (None, None, None)
+    assert store.set_mapping(session, kept.id, {"columns": []}, {}, {}).mapping == {"columns": []}
+    store.mappings.keep(session, "car 7", {"columns": []})
     done = store.set_conditioning(session, kept.id, {"steps": [], "vehicle": None}, kept.summary)
     assert done.conditioning == {"steps": [], "vehicle": None}
     assert store.set_manoeuvre(session, kept.id, {"name": "lap"}).manoeuvre == {"name": "lap"}
@@ -323,6 +327,44 @@ def test_manoeuvres_take_their_share_of_the_session(tmp_path):
     store.set_manoeuvre(session, one.id, None)
     store.set_manoeuvre(session, other.id, {"name": ""})
     store.close()
+
+
+def test_mappings_are_kept_by_name_and_take_their_share_of_the_session(tmp_path):
+    """Oracle: {"a": "..."} has 9 characters besides what is between the quotes."""
+    store = Store(tmp_path, Limits(session_bytes=100))
+    (session, _), (other, _) = (store.create_session(CAR, []) for _ in "ab")
+    store.mappings.keep(session, "first", {"a": "x" * 31})
+    store.mappings.keep(session, "second", {"a": ""})
+    assert list(store.mappings.of_session(session)) == ["second", "first"]
+    with pytest.raises(Busy, match="delete one first"):
+        store.mappings.keep(session, "third", {"a": "x" * 50})
+    store.mappings.keep(session, "first", {"a": "x" * 50})
+    assert list(store.mappings.of_session(session)) == ["first", "second"]
+    assert store.mappings.of_session(other) == {}
+    with pytest.raises(NotFound):
+        store.mappings.delete(other, "first")
+    store.mappings.delete(session, "first")
+    assert store.mappings.of_session(session) == {"second": {"a": ""}}
+    store.delete_session(session)
+    assert store.mappings.of_session(session) == {}
+    store.close()
+
+
+def test_a_session_keeps_a_hundred_mappings(store, session):
+    for number in range(100):
+        store.mappings.keep(session, str(number), {})
+    store.mappings.keep(session, "7", {"again": 1})
+    with pytest.raises(Busy, match="already keeps 100 mappings"):
+        store.mappings.keep(session, "one more", {})
+
+
+def test_a_measurement_in_use_keeps_its_mapping(store, session):
+    kept = store.add_measurement(session, recording())
+    job = queued(store, session, runs=(kept.id,))
+    with pytest.raises(Conflict, match=job):
+        store.set_mapping(session, kept.id, {}, {}, {})
+    store.jobs.finish(job, "cancelled")
+    assert store.set_mapping(session, kept.id, {}, {}, {}).mapping == {}
 
 
 def test_a_restart_takes_running_jobs_back_and_counts_it_apart(store, session):

@@ -1,0 +1,126 @@
+"""Which columns of an uploaded file are which channels: what is guessed, what holds, what is kept
+by name for the next file.
+"""
+
+from dataclasses import replace
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Body, Query
+from starlette.concurrency import run_in_threadpool
+
+from .access import SessionId
+from .columns import columns_to_json, preview
+from .recordings import parse, recorded, summary
+from .routes_measurements import measurement_to_json
+from .schemas import JsonObject, NamedMapping
+from .services import Services, Shared
+from .store import Measurement
+from .strict_json import StrictRoute
+
+MOST_SHOWN = 20
+"""Columns in one preview."""
+
+router = APIRouter(prefix="/api/sessions/{sid}", tags=["mappings"], route_class=StrictRoute)
+
+MappingBody = Annotated[JsonObject, Body(description="Columns as channels, see docs/files.")]
+
+
+@router.get("/measurements/{mid}/columns")
+async def columns(sid: SessionId, mid: str, services: Shared) -> dict[str, Any]:
+    """The file's columns, what each may be and why, and a mapping to begin with."""
+    kept = services.store.measurement(sid, mid)
+    async with services.parsing:
+        return await run_in_threadpool(_columns, services, sid, kept)
+
+
+def _columns(services: Services, sid: str, kept: Measurement) -> dict[str, Any]:
+    from ..engine.mapping.mapping import mapping_from_json
+
+    templates = {
+        name: mapping_from_json(one, name)
+        for name, one in services.store.mappings.of_session(sid).items()
+    }
+    found = services.recordings.survey(kept).with_templates(templates)
+    return columns_to_json(found, kept.mapping)
+
+
+@router.get("/measurements/{mid}/columns/preview")
+async def columns_preview(
+    sid: SessionId,
+    mid: str,
+    services: Shared,
+    index: Annotated[list[int], Query(max_length=MOST_SHOWN)],
+    points: Annotated[int, Query(ge=2, le=5000)] = 500,
+) -> list[dict[str, Any]]:
+    """Least and greatest value of some columns in stretches of equally many samples."""
+    kept = services.store.measurement(sid, mid)
+
+    def shown() -> list[dict[str, Any]]:
+        with services.recordings.table(kept) as table:
+            return preview(table, index, points)
+
+    async with services.parsing:
+        return await run_in_threadpool(shown)
+
+
+@router.put("/measurements/{mid}/mapping")
+async def set_mapping(
+    sid: SessionId, mid: str, services: Shared, body: MappingBody
+) -> dict[str, Any]:
+    """Take a file's columns for channels; refused while a job reads it."""
+    services.store.require_unused(sid, mid)
+    kept = services.store.measurement(sid, mid)
+    async with services.parsing:
+        return measurement_to_json(await run_in_threadpool(_map, services, sid, kept, body))
+
+
+def _map(services: Services, sid: str, kept: Measurement, body: JsonObject) -> Measurement:
+    from ..engine.mapping.mapping import mapping_from_json, mapping_to_json
+
+    mapping = mapping_to_json(mapping_from_json(body, "mapping"))
+    data = services.store.original(kept).read_bytes()
+    noise = dict(parse(data, kept.name, kept.noise, mapping).noise)
+    done = services.recordings.run(replace(kept, mapping=mapping, noise=noise, summary={}))
+    found = summary(done, mapped=True)
+    return services.store.set_mapping(sid, kept.id, mapping, noise, found)
+
+
+@router.delete("/measurements/{mid}/mapping")
+async def forget_mapping(sid: SessionId, mid: str, services: Shared) -> dict[str, Any]:
+    """Go by the names of the file's columns again."""
+    services.store.require_unused(sid, mid)
+    kept = services.store.measurement(sid, mid)
+
+    def by_names() -> Measurement:
+        data = services.store.original(kept).read_bytes()
+        found = recorded(data, kept.name, kept.noise)
+        bare = replace(kept, mapping=None, noise=found.noise, summary=found.summary)
+        unmapped = found.summary["needs_mapping"]
+        known = found.summary if unmapped else summary(services.recordings.run(bare))
+        return services.store.set_mapping(sid, kept.id, None, found.noise, known)
+
+    async with services.parsing:
+        return measurement_to_json(await run_in_threadpool(by_names))
+
+
+@router.get("/mappings")
+def mappings(sid: SessionId, services: Shared) -> list[dict[str, Any]]:
+    """The mappings that are kept by name, the newest first."""
+    kept = services.store.mappings.of_session(sid)
+    return [{"name": name, "mapping": one} for name, one in kept.items()]
+
+
+@router.post("/mappings", status_code=201)
+def keep_mapping(sid: SessionId, services: Shared, body: NamedMapping) -> dict[str, Any]:
+    """Keep a mapping under a name, in place of one that has it."""
+    from ..engine.mapping.mapping import mapping_from_json, mapping_to_json
+
+    mapping = mapping_to_json(mapping_from_json(body.mapping, "mapping"))
+    services.store.mappings.keep(sid, body.name, mapping)
+    return {"name": body.name, "mapping": mapping}
+
+
+@router.delete("/mappings/{name}", status_code=204)
+def delete_mapping(sid: SessionId, name: str, services: Shared) -> None:
+    """Remove a mapping; measurements that have it keep it."""
+    services.store.mappings.delete(sid, name)

@@ -1,0 +1,223 @@
+"""Files of other houses over REST. Oracle: a sample run under other names and in other units."""
+
+import json
+
+import numpy as np
+import pytest
+from ridetune.engine.measurement import read_run
+
+from .conftest import SAMPLES, short_recording
+from .test_cli_channels import TITLES
+from .test_frames import read_binary
+
+NATIVE = SAMPLES / "twin/manoeuvre_2.csv"
+STEP = 5
+"""Every fifth sample of the run is sent, which is enough."""
+
+
+def foreign(step: int = STEP, turned: tuple[str, ...] = ()) -> bytes:
+    """The sample run as another house writes it, with an oil pressure."""
+    run = read_run(NATIVE)
+    titles = [*(title for title, _ in TITLES.values()), "Oeldruck [bar]"]
+    columns = [
+        (-factor if name in turned else factor) * run[name][::step]
+        for name, (_, factor) in TITLES.items()
+    ]
+    rows = np.transpose([*columns, np.full_like(columns[0], 3.0)])
+    lines = [";".join(titles), *(";".join(f"{x:.12g}" for x in row) for row in rows)]
+    return "\n".join(lines).encode()
+
+
+@pytest.fixture
+def kept(visitor):
+    """An upload that needs a mapping; its pitch is turned over."""
+    reply = visitor.upload(foreign(turned=("chassis.pitch",)), "lap.csv")
+    assert reply.status_code == 201
+    return reply.json()
+
+
+def test_a_file_with_other_names_is_kept_until_it_is_mapped(visitor, kept):
+    assert kept["needs_mapping"] is True
+    assert kept["usable_for_identification"] is False
+    assert kept["missing"] == []
+    assert kept["channels"] == []
+    assert kept["mapping"] is None
+    assert kept["samples"] == 801
+    assert "no column is called time" in kept["warnings"][0]
+    assert any("fit mg, not g" in one for one in kept["warnings"])
+    assert visitor.get(f"/measurements/{kept['id']}").json() == kept
+    original = visitor.get(f"/measurements/{kept['id']}/original").content
+    assert original == foreign(turned=("chassis.pitch",))
+
+
+@pytest.mark.parametrize(
+    ("path", "body"),
+    [
+        ("/simulations", lambda mid: {"rims": {"measurement": mid}}),
+        ("/identifications", lambda mid: {"runs": [mid]}),
+    ],
+)
+def test_what_is_not_mapped_is_not_used(visitor, kept, path, body):
+    reply = visitor.post(path, json=body(kept["id"]))
+    assert (reply.status_code, reply.json()["code"]) == (422, "measurement")
+    assert reply.json()["detail"] == (
+        "lap.csv: its columns are not mapped to channels; map them first."
+    )
+    assert visitor.get(f"/measurements/{kept['id']}/frames").status_code == 422
+
+
+def test_columns_come_with_numbers_guess_reasons_and_candidates(visitor, kept):
+    found = visitor.get(f"/measurements/{kept['id']}/columns").json()
+    assert (found["kind"], found["template"], found["mapping"]) == ("CSV", None, None)
+    columns = {one["name"]: one for one in found["columns"]}
+    assert [one["index"] for one in found["columns"]] == list(range(9))
+    pitch = columns["Nickwinkel"]
+    assert (pitch["unit"], pitch["samples"], pitch["gaps"], pitch["constant"]) == (
+        "rad",
+        801,
+        0,
+        False,
+    )
+    measured = -np.degrees(read_run(NATIVE)["chassis.pitch"][::STEP])
+    assert (pitch["minimum"], pitch["maximum"]) == pytest.approx((measured.min(), measured.max()))
+    assert pitch["guess"]["channel"] == "chassis.pitch"
+    assert pitch["guess"]["unit"] == "deg"
+    assert pitch["guess"]["doubted"] is True
+    assert "unit lies" in pitch["guess"]["reason"]
+    assert pitch["candidates"][0] == pitch["guess"]
+    assert columns["Oeldruck"]["guess"] is None
+    assert columns["Oeldruck"]["constant"] is True
+    assert {one["channel"] for one in found["proposed"]["columns"]} == set(TITLES)
+    json.dumps(found, allow_nan=False)
+
+
+def test_what_is_proposed_can_be_put_and_signs_are_offered(visitor, kept):
+    path = f"/measurements/{kept['id']}"
+    proposed = visitor.get(f"{path}/columns").json()["proposed"]
+    mapped = visitor.put(f"{path}/mapping", json=proposed)
+    assert mapped.status_code == 200, mapped.text
+    found = mapped.json()
+    assert found["needs_mapping"] is False
+    assert found["usable_for_identification"] is True
+    assert found["mapping"] == proposed
+    [offered] = found["sign_suggestions"]
+    assert (offered["channel"], offered["flip"]) == ("chassis.pitch", True)
+    assert offered["correlation"] < -0.5
+    assert "turn it over" in offered["sentence"]
+    assert visitor.get(path).json() == found
+    assert visitor.get(f"{path}/columns").json()["mapping"] == proposed
+
+
+def test_a_mapped_file_is_a_measurement_like_any_other(visitor, kept):
+    """Once pitch is turned back, frames, notes and a simulation are those of the native file."""
+    path = f"/measurements/{kept['id']}"
+    mapping = visitor.get(f"{path}/columns").json()["proposed"]
+    next(one for one in mapping["columns"] if one["channel"] == "chassis.pitch")["sign"] = -1
+    found = visitor.put(f"{path}/mapping", json=mapping).json()
+    assert found["sign_suggestions"] == []
+    run = read_run(NATIVE)
+    binary = visitor.get(f"{path}/frames", headers={"Accept": "application/vnd.ridetune.frames"})
+    _, values = read_binary(binary.content)
+    for name in TITLES:
+        np.testing.assert_allclose(values[name], run[name][::STEP], rtol=1e-6, atol=1e-7)
+    noted = visitor.put(f"{path}/notes", content=b'[noise]\n"chassis.z" = 0.001\n').json()
+    assert noted == found | {"noise": {"chassis.z": 0.001}}
+    simulation = {"rims": {"measurement": kept["id"]}, "max_samples": 2}
+    head = visitor.post("/simulations", json=simulation).json()
+    assert head["fit_percent"]["chassis.pitch"] > 50.0
+
+
+def test_another_mapping_makes_another_run(visitor, kept):
+    """What was remembered of the first one does not outlive it."""
+    path = f"/measurements/{kept['id']}"
+    mapping = visitor.get(f"{path}/columns").json()["proposed"]
+    visitor.put(f"{path}/mapping", json=mapping)
+    first = visitor.get(f"{path}/frames?channels=chassis.z").json()["values"]["chassis.z"]
+    next(one for one in mapping["columns"] if one["channel"] == "chassis.z")["gain"] = 2.0
+    visitor.put(f"{path}/mapping", json=mapping)
+    second = visitor.get(f"{path}/frames?channels=chassis.z").json()["values"]["chassis.z"]
+    np.testing.assert_allclose(second, 2.0 * np.array(first), rtol=1e-6)
+    forgotten = visitor.delete(f"{path}/mapping").json()
+    assert forgotten == kept
+
+
+def test_notes_of_a_file_that_needs_a_mapping_wait_for_it(visitor, kept):
+    path = f"/measurements/{kept['id']}"
+    noted = visitor.put(f"{path}/notes", content=b'[noise]\n"chassis.z" = 0.5\n').json()
+    assert noted == kept | {"noise": {"chassis.z": 0.5}}
+    proposed = visitor.get(f"{path}/columns").json()["proposed"]
+    found = visitor.put(f"{path}/mapping", json=proposed).json()
+    assert found["noise"] == {"chassis.z": 0.5}
+    assert any("is this one in mm?" in one for one in found["warnings"])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"columns": [{"column": "Aufbauhub", "channel": "chassis.z", "unit": "s"}]}, "columns[0]"),
+        ({"columns": [{"column": "nowhere", "channel": "chassis.z", "unit": "m"}]}, "'nowhere'"),
+        ({"columns": []}, "names no channel besides time"),
+        ({"colums": []}, 'did you mean "columns"?'),
+    ],
+)
+def test_a_mapping_that_does_not_fit_is_refused_and_nothing_changes(visitor, kept, wrong, said):
+    path = f"/measurements/{kept['id']}"
+    reply = visitor.put(f"{path}/mapping", json=wrong)
+    assert (reply.status_code, reply.json()["code"]) == (422, "measurement")
+    assert said in reply.json()["detail"]
+    assert visitor.get(path).json() == kept
+    assert visitor.put("/measurements/none/mapping", json=wrong).status_code == 404
+
+
+def test_our_own_names_can_be_mapped_otherwise(visitor):
+    """The unit of one column is corrected, its channel stays."""
+    sent = visitor.upload(short_recording().replace(b"chassis.z [mm]", b"chassis.z [m]")).json()
+    assert sent["needs_mapping"] is False
+    path = f"/measurements/{sent['id']}"
+    found = visitor.get(f"{path}/columns").json()
+    guess = next(one["guess"] for one in found["columns"] if one["name"] == "chassis.z")
+    assert (guess["unit"], guess["doubted"]) == ("mm", True)
+    mapped = visitor.put(f"{path}/mapping", json=found["proposed"]).json()
+    height = next(one for one in mapped["channels"] if one["name"] == "chassis.z")
+    assert height["maximum"] == pytest.approx(0.004)
+    assert visitor.delete(f"{path}/mapping").json() == sent
+
+
+def test_a_preview_shows_the_file_s_numbers_over_time_in_s(visitor, kept):
+    path = f"/measurements/{kept['id']}/columns/preview?index=2&index=3&points=40"
+    pitch, a_x = visitor.get(path).json()
+    assert (pitch["name"], pitch["unit"], pitch["time_unit"]) == ("Nickwinkel", "rad", "s")
+    assert (a_x["index"], a_x["name"]) == (3, "acc_x_g")
+    run = read_run(NATIVE)
+    degrees = -np.degrees(run["chassis.pitch"][::STEP])
+    assert len(pitch["time"]) == len(pitch["minimum"]) == 40
+    assert min(pitch["minimum"]) == pytest.approx(degrees.min())
+    assert max(pitch["maximum"]) == pytest.approx(degrees.max())
+    assert pitch["time"][0] == pytest.approx(run.time[0])
+    assert run.time[0] < pitch["time"][-1] < run.time[-1]
+    beyond = visitor.get(f"/measurements/{kept['id']}/columns/preview?index=9")
+    assert (beyond.status_code, beyond.json()["field"]) == (422, "index")
+    assert "they go from 0 to 8" in beyond.json()["detail"]
+
+
+def test_a_mapping_that_is_kept_is_proposed_for_the_next_file(visitor, kept):
+    """A column was taken for nothing, and pitch turned over: as the engineer said."""
+    path = f"/measurements/{kept['id']}"
+    mapping = visitor.get(f"{path}/columns").json()["proposed"]
+    mapping["columns"] = mapping["columns"][:3]
+    mapping["columns"][2]["sign"] = -1
+    stored = visitor.post("/mappings", json={"name": "car 7", "mapping": mapping})
+    assert (stored.status_code, stored.json()) == (201, {"name": "car 7", "mapping": mapping})
+    other = {"columns": [{"column": "other", "channel": "chassis.z", "unit": "m"}]}
+    visitor.post("/mappings", json={"name": "another car", "mapping": other})
+    names = [one["name"] for one in visitor.get("/mappings").json()]
+    assert names == ["another car", "car 7"]
+    later = visitor.upload(foreign(step=10), "next.csv").json()
+    found = visitor.get(f"/measurements/{later['id']}/columns").json()
+    assert (found["template"], found["proposed"]) == ("car 7", mapping)
+    assert visitor.delete("/mappings/car 7").status_code == 204
+    assert visitor.delete("/mappings/car 7").status_code == 404
+    found = visitor.get(f"/measurements/{later['id']}/columns").json()
+    assert found["template"] is None
+    bad = visitor.post("/mappings", json={"name": "x", "mapping": {"columns": 1}})
+    assert bad.status_code == 422
