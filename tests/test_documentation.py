@@ -1,5 +1,6 @@
 """The documentation tells the truth: its example runs, its tables are the engine's."""
 
+import json
 import re
 import subprocess
 import sys
@@ -7,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from ridetune.engine.channels import CHANNEL_KINDS
+from ridetune.engine.mapping.mapping import mapping_from_json
 from ridetune.engine.parameters import ALL_PARAMETERS, PARAMETERS
 from ridetune.engine.vehicle_file import vehicle_from_text
 
@@ -39,6 +41,13 @@ def test_every_channel_is_in_the_table():
 def test_every_parameter_is_in_the_table():
     rows = re.findall(r"^\| (\w+) \| `(\S+)` \| (.+?) \|$", CONVENTIONS, re.MULTILINE)
     assert rows == [(one.symbol, one.name, one.unit) for one in ALL_PARAMETERS]
+
+
+def test_mapping_example_is_one():
+    files = (ROOT / "docs" / "files.md").read_text()
+    (example,) = re.findall(r'^    (\{"columns": .*?"step": null\})$', files, re.M | re.S)
+    mapping = mapping_from_json(json.loads(example))
+    assert [one.channel for one in mapping.columns] == ["time", "chassis.pitch"]
 
 
 def test_vehicle_example_is_one():
