@@ -12,8 +12,9 @@ import csv
 import io
 import math
 import re
+from array import array
 from collections.abc import Generator, Iterator, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from functools import partial
 from itertools import chain, islice
 from typing import BinaryIO
@@ -122,21 +123,35 @@ class CsvTable:
             raise self._bad_number(line, indices[column], cell, remedy, "too large")
         return table
 
-    def with_gaps(self, column: int) -> NDArray[np.float64]:
-        """The numbers of one column (samples,), NaN where its cell is empty."""
-        try:
-            return self.numbers([column])[:, 0]
-        except MeasurementError:
-            values = [self._number_or_gap(column, *row) for row in self._rows([column])]
-        return np.array(values, dtype=np.float64)
+    def with_gaps(
+        self, columns: Sequence[int]
+    ) -> tuple[NDArray[np.float64], dict[int, MeasurementError]]:
+        """The numbers of some columns (samples, len(columns)), NaN where a cell is empty; and by
+        column the error of its first cell that holds something else.
+        """
+        with suppress(MeasurementError):
+            return self.numbers(columns), {}
+        numbers, bad = array("d"), {}
+        for line, text in self._rows(columns):
+            cells = text.split(self._delimiter)
+            try:
+                if "_" in text:  # Python takes 1_000 for a number
+                    raise ValueError
+                row = [float(cells[column]) for column in columns]
+            except ValueError:
+                row = [self._number_or_gap(column, line, text, bad) for column in columns]
+            numbers.extend(row)
+        return np.frombuffer(numbers, dtype=np.float64).reshape(-1, len(columns)), bad
 
-    def _number_or_gap(self, column: int, line: int, text: str) -> float:
+    def _number_or_gap(
+        self, column: int, line: int, text: str, bad: dict[int, MeasurementError]
+    ) -> float:
         cell = text.split(self._delimiter)[column].strip()
-        if cell.lower() in _GAPS:
-            return math.nan
-        if not _NUMBER.fullmatch(cell):
-            raise self._bad_cell([column], line, text)
-        return float(cell)
+        if _NUMBER.fullmatch(cell):
+            return float(cell)
+        if cell.lower() not in _GAPS and column not in bad:
+            bad[column] = self._bad_cell([column], line, text)
+        return math.nan
 
     def count(self) -> int:
         """Number of rows with data."""

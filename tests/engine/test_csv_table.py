@@ -278,6 +278,16 @@ def test_a_spoilt_first_row_is_no_header():
         assert f"line 2, column {column}" in said
 
 
-def test_empty_cells_are_gaps_where_they_are_asked_for():
-    table = table_of("time,a\n0,\n1,2\n2,nan\n")
-    np.testing.assert_array_equal(table.with_gaps(1), [np.nan, 2.0, np.nan])
+def test_empty_cells_are_gaps_and_other_text_spoils_its_column_alone():
+    """Three columns in one pass: whole, with gaps, with a word."""
+    text = "a,b,c\n1,2,3\n2,,x\n3,NaN,1_0\n4,5,6\n"
+    numbers, bad = table_of(text).with_gaps([0, 1, 2])
+    np.testing.assert_array_equal(numbers[:, 0], [1.0, 2.0, 3.0, 4.0])
+    np.testing.assert_array_equal(numbers[:, 1], [2.0, np.nan, np.nan, 5.0])
+    assert list(bad) == [2]
+    assert "line 3, column c: 'x' is not a number" in str(bad[2])
+
+
+def test_a_number_with_underscores_is_no_number():
+    _, bad = table_of("a,b\n1,2\n2,1_0\n").with_gaps([0, 1])
+    assert "line 3, column b: '1_0' is not a number" in str(bad[1])
