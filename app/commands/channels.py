@@ -24,7 +24,8 @@ def channels(options: Namespace) -> None:
         warnings += found.warnings
         mapping = found.guess.mapping
         try:
-            warnings += _findings(options.recording, mapping)
+            if any(one.channel != "time" for one in mapping.columns):
+                warnings += _findings(options.recording, mapping)
         except MeasurementError as error:
             warnings.append(str(error))
     else:
@@ -70,5 +71,7 @@ def _print(found: Survey) -> None:
 
 def _may_be(found: Survey, index: int) -> str:
     """What a column that is taken for nothing may be."""
+    if any(one.clock == index for one in found.columns):
+        return "the time of others"
     names = [one.channel for one in found.guess.candidates[index][:2]]
     return f"may be {' or '.join(names)}" if names else ""

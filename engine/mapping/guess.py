@@ -69,17 +69,21 @@ def named_like_channels(columns: Sequence[Column]) -> list[int]:
     return [index for index, one in enumerate(columns) if _candidates(one, None, False)]
 
 
-def guess(columns: Sequence[Column], known: Mapping[int, Statistics]) -> Guess:
+def guess(
+    columns: Sequence[Column], known: Mapping[int, Statistics], *, clocks_told: bool = False
+) -> Guess:
     """What the columns of a file probably are.
 
     known : what the numbers of a column say, for those whose numbers were looked at
+    clocks_told : whether the file tells which column is the time of which, so that none needs to be
+        mapped as time
     """
     clocks = {one.clock for one in columns if one.clock is not None}
     candidates = [
         _candidates(one, known.get(index), index in clocks) for index, one in enumerate(columns)
     ]
     twice = _named_twice(columns)
-    for index in twice:
+    for index in (*twice, *(clocks if clocks_told else ())):
         candidates[index] = []
     chosen = _assigned(candidates)
     for index, one in chosen.items():
@@ -203,6 +207,8 @@ def _warnings(
 ) -> list[str]:
     """Sentences about units that lie, stand-ins, gaps, clipping and constant columns."""
     said = []
+    if all(one.channel == "time" for one in chosen.values()):
+        said.append("No column is taken for a channel by its name; map some by hand.")
     for index in twice:
         said.append(
             f"Column {index + 1} is called {columns[index].name} like an earlier one; it can be"

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from ..errors import MeasurementError
+from ..formats.kinds import CSV
 from ..formats.table import Column, Table
 from .guess import Guess, guess, named_like_channels, with_template
 from .mapping import ChannelMapping
@@ -51,5 +52,5 @@ def survey(table: Table) -> Survey:
             known[index] = statistics(table.values(index))
         except MeasurementError as error:
             warnings.append(str(error).removeprefix(f"{table.source}: "))
-    found = guess(columns, known)
+    found = guess(columns, known, clocks_told=table.kind != CSV)
     return Survey(table.source, table.kind, columns, known, found, (*warnings, *found.warnings))

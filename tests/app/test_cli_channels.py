@@ -119,3 +119,14 @@ def test_what_cannot_be_applied_yet_is_said_with_the_guess(foreign, capsys):
     printed = capsys.readouterr().out
     assert "Warning: Aufbauhub is -9999 in 5 samples, far outside the rest" in printed
     assert 'map it with "missing": [-9999], else with "missing": []' in printed
+
+
+def test_of_a_file_that_says_nothing_everything_is_left_to_a_person(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    rows = "\n".join(f"{k},{k % 7}" for k in range(20))
+    (tmp_path / "raw.csv").write_text(f"channel 1 [V],channel 2 [V]\n{rows}\n")
+    assert main(["channels", "raw.csv", "-o", "mapping.json"]) == 0
+    assert (
+        "No column is taken for a channel by its name; map some by hand." in capsys.readouterr().out
+    )
+    assert json.loads((tmp_path / "mapping.json").read_text())["columns"] == []

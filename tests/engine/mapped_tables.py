@@ -30,7 +30,7 @@ def held(columns: Mapping[str, tuple[str, np.ndarray]], **common) -> HeldTable:
         Column(name, unit, len(numbers), **{"clock": time if k != time else None, **common})
         for k, (name, (unit, numbers)) in enumerate(columns.items())
     )
-    return HeldTable("lap", "test", described, [numbers for _, numbers in columns.values()])
+    return HeldTable("lap", "CSV", described, [numbers for _, numbers in columns.values()])
 
 
 def renamed(run: Run, names: Names) -> HeldTable:
