@@ -3,7 +3,7 @@
 
 import * as api from "./api.js";
 import { $, breakable, h, inPlace } from "./dom.js";
-import { nameOf, original } from "./names.js";
+import { lacks, nameOf, original } from "./names.js";
 import { sentence } from "./noise.js";
 import { notice } from "./notices.js";
 import { AXIS, COLOURS, fitWidth } from "./plots.js";
@@ -108,7 +108,7 @@ async function take(file) {
   const { length } = row.warnings;
   const fit = row.usable_for_identification
     ? `${units.number(row.duration, 3)} s, with all that an identification needs`
-    : `It lacks ${row.missing.join(", ")} for identification`;
+    : lacks(row);
   notice(length || !row.usable_for_identification ? "warning" : "info", `${nameOf(row.id)} is in`,
     length ? `${fit}; but what was found in it raises doubts.` : `${fit}.`,
     length ? { label: `See ${warned(length)}`, run: () => showWarnings(row.id) } : null);
@@ -206,7 +206,7 @@ function badges(row) {
       warned(row.warnings.length)));
   }
   if (!row.usable_for_identification) {
-    out.push(h("span", { className: "badge", title: `It lacks ${row.missing.join(", ")}.` },
+    out.push(h("span", { className: "badge", title: `${lacks(row)}.` },
       "not for fitting"));
   }
   return out;
@@ -243,8 +243,7 @@ function detail(row) {
         on: { click: () => forget(row) } }, "Forget")] : null),
     ...(row.warnings.length
       ? [h("ul", { className: "warnings", tabIndex: -1 }, row.warnings.map((text) => h("li", {}, text)))] : []),
-    ...(row.usable_for_identification ? [] : [h("p", { className: "hint" },
-      `It lacks ${row.missing.join(", ")}; identification needs them.`)]),
+    ...(row.usable_for_identification ? [] : [h("p", { className: "hint" }, `${lacks(row)}.`)]),
   );
   if (names.length) look(row, choice.value, drawing, facts);
 }

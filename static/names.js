@@ -21,3 +21,8 @@ export function nameOf(id) {
   const at = rows.findIndex((row) => row.id === id);
   return at < 0 ? null : distinct(rows.map(({ name }) => name))[at];
 }
+
+/** Why a recording is of no use for identification. */
+export const lacks = (row) => row.needs_mapping
+  ? "Its columns are not mapped to channels yet"
+  : `It lacks ${row.missing.join(", ")} for identification`;

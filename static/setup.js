@@ -2,7 +2,7 @@
 
 import { breakable, h } from "./dom.js";
 import * as free from "./free.js";
-import { nameOf, original } from "./names.js";
+import { lacks, nameOf, original } from "./names.js";
 import * as noise from "./noise.js";
 import * as preparation from "./preparation.js";
 import { get } from "./store.js";
@@ -59,8 +59,7 @@ function runRow(run) {
             { "aria-label": `Use of ${nameOf(run.id)}` }),
           h("label", {}, "brakes", preparation.brakingField(run)),
           copied(run))
-      : h("span", { className: "badge", title: `It lacks ${run.missing.join(", ")}.` },
-        "not for fitting"));
+      : h("span", { className: "badge", title: `${lacks(run)}.` }, "not for fitting"));
 }
 
 function copied(run) {
