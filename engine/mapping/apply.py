@@ -24,7 +24,7 @@ from ..plausibility import (
 )
 from ..run_notes import checked_noise, doubtful_noise
 from ..units import UnitError, to_si
-from .mapping import ChannelMapping, MappedColumn, places
+from .mapping import ChannelMapping, MappedColumn, Places
 from .numbers import statistics
 from .sizes import plain_unit
 
@@ -89,9 +89,9 @@ def apply(
 
 def _found(mapping: ChannelMapping, table: Table) -> dict[str, tuple[MappedColumn, int]]:
     """By channel its entry, and which column of the table that is."""
-    found = {}
+    found, places = {}, Places(table.columns)
     for entry in mapping.columns:
-        where = places(table.columns, entry.column, entry.group)
+        where = places.of(entry.column, entry.group)
         if len(where) != 1:
             group = f" in the group {entry.group!r}" if entry.group else ""
             what = f"has {len(where)} columns" if where else "has no column"

@@ -13,7 +13,7 @@ from scipy.optimize import linear_sum_assignment
 from ..channels import ChannelInfo, channel, find_channel
 from ..csv_table import split_title
 from ..formats.table import Column
-from .mapping import ChannelMapping, MappedColumn, places
+from .mapping import ChannelMapping, MappedColumn, Places
 from .names import readings
 from .numbers import Statistics
 from .patterns import MEASURES, fits
@@ -112,9 +112,9 @@ def guess(
 
 def with_template(found: Guess, columns: Sequence[Column], template: ChannelMapping) -> Guess:
     """A guess with the mapping of a template that fits the columns in place of the guessed one."""
-    chosen = {}
+    chosen, places = {}, Places(columns)
     for one in template.columns:
-        [index] = places(tuple(columns), one.column, one.group)
+        [index] = places.of(one.column, one.group)
         reason = "template" + (f"; {one.note}" if one.note else "")
         chosen[index] = Candidate(one.channel, one.unit, one.sign, 1.0, reason)
     return replace(found, mapping=template, chosen=chosen)

@@ -7,7 +7,7 @@ It is kept as JSON and used again for every file whose columns have the same nam
      "longest_gap": 0.1, "step": null}
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -19,6 +19,9 @@ from ..json_record import RecordReader, record_to_json
 from ..json_text import read_json
 from ..units import UnitError, to_si
 from ..vehicle import Range
+
+MOST_MAPPED = 1000
+"""Most columns of a mapping."""
 
 LONGEST_GAP = 0.1
 """Time without samples that is bridged unless told, s."""
@@ -77,6 +80,8 @@ class ChannelMapping:
 
     def __post_init__(self) -> None:
         """Refuse a channel or a column that is taken twice."""
+        if len(self.columns) > MOST_MAPPED:
+            raise MeasurementError(f"columns are more than {MOST_MAPPED}; map those that are used.")
         channels: dict[str, str] = {}
         columns: dict[tuple[str, str], str] = {}
         for one in self.columns:
@@ -93,18 +98,27 @@ class ChannelMapping:
             channels[one.channel] = one.column
             columns[one.group, one.column] = one.channel
 
-    def fits(self, columns: tuple[Column, ...]) -> bool:
+    def fits(self, columns: "Places") -> bool:
         """Whether a file has every column."""
         return bool(self.columns) and all(
-            len(places(columns, one.column, one.group)) == 1 for one in self.columns
+            len(columns.of(one.column, one.group)) == 1 for one in self.columns
         )
 
 
-def places(columns: tuple[Column, ...], name: str, group: str) -> list[int]:
-    """Where a column is in a file: in its group, else by its name alone."""
-    named = [index for index, one in enumerate(columns) if one.name == name]
-    grouped = [index for index in named if columns[index].group == group]
-    return grouped or ([] if group and len(named) > 1 else named)
+class Places:
+    """Where the columns of a file are, by name and group."""
+
+    def __init__(self, columns: Sequence[Column]):
+        self._named: dict[str, list[int]] = {}
+        self._groups = [one.group for one in columns]
+        for index, one in enumerate(columns):
+            self._named.setdefault(one.name, []).append(index)
+
+    def of(self, name: str, group: str) -> list[int]:
+        """Where a column is: in its group, else by its name alone."""
+        named = self._named.get(name, [])
+        grouped = [index for index in named if self._groups[index] == group]
+        return grouped or ([] if group and len(named) > 1 else named)
 
 
 def read_mapping(path: str | Path) -> ChannelMapping:

@@ -87,7 +87,15 @@ class Reading:
     ending: tuple[str, ...] = ()
 
 
-@lru_cache(maxsize=4096)
+_STEMS = {
+    word[:length]: word
+    for word in reversed(list(WORDS))
+    for length in range(SHORTEST_STEM, len(word))
+}
+"""Abbreviations of known words."""
+
+
+@lru_cache(maxsize=65_536)
 def readings(name: str) -> tuple[Reading, ...]:
     """Every way to read a name: as it is, and with its last word as a unit; none of a column that
     says to be something else.
@@ -135,10 +143,11 @@ def _words(tokens: Iterable[str]) -> list[str]:
     return [word for token in joined for word in _divided(token)]
 
 
-def _divided(token: str) -> list[str]:
-    """A token as known words, or itself."""
+@lru_cache(maxsize=65_536)
+def _divided(token: str) -> tuple[str, ...]:
+    """A token as known words, as the one that it abbreviates, or itself."""
     if _known(token):
-        return [token]
+        return (token,)
     best: list[list[str] | None] = [[], *(None for _ in token)]
     for end in range(1, len(token) + 1):
         for start in range(end):
@@ -149,8 +158,8 @@ def _divided(token: str) -> list[str]:
                 best[end] = [*head, word]
     whole = best[-1]
     if whole is not None and any(len(word) > 2 for word in whole):
-        return whole
-    return [_stem(token)]
+        return tuple(whole)
+    return (_STEMS.get(token, token),)
 
 
 def _known(word: str) -> bool:
@@ -164,15 +173,6 @@ def _may_stand(word: str, start: int, last: bool) -> bool:
     if word == "s":  # between German nouns
         return start > 5 and not last
     return word in CORNER_WORDS or (last and word in LETTERS)
-
-
-def _stem(token: str) -> str:
-    """The known word that a token abbreviates, if any, else the token."""
-    if len(token) >= SHORTEST_STEM:
-        for word in WORDS:
-            if len(word) > len(token) and word.startswith(token):
-                return word
-    return token
 
 
 def _read(words: Iterable[str], ending: tuple[str, ...]) -> Reading:

@@ -104,11 +104,10 @@ def fits(reading: Reading, measured: str) -> Iterator[tuple[str, float]]:
     quantity = reading.said.get("quantity", "") or measured
     kept = STRANGE_WORD ** min(reading.strange, MOST_STRANGE)
     for pattern in PATTERNS:
-        name = _placed(pattern.channel, reading.said)
         fit = kept * pattern.quantity.get(quantity, 0.0)
         fit *= pattern.axis.get(reading.said.get("axis", ""), 0.0)
         fit *= pattern.part.get(reading.said.get("part", ""), 0.0)
-        if name and fit > 0.0 and find_channel(name):
+        if fit > 0.0 and find_channel(name := _placed(pattern.channel, reading.said)):
             yield name, fit
 
 

@@ -7,7 +7,7 @@ from ..errors import MeasurementError
 from ..formats.kinds import CSV
 from ..formats.table import Column, Table
 from .guess import Guess, guess, named_like_channels, with_template
-from .mapping import ChannelMapping
+from .mapping import ChannelMapping, Places
 from .numbers import Statistics, statistics
 
 MOST_SURVEYED = 25_000_000
@@ -32,8 +32,9 @@ class Survey:
 
     def with_templates(self, templates: Mapping[str, ChannelMapping]) -> "Survey":
         """With the first of some templates that fits the columns in place of the guess."""
+        places = Places(self.columns)
         for name, one in templates.items():
-            if one.fits(self.columns):
+            if one.fits(places):
                 found = with_template(self.guess, self.columns, one)
                 return replace(self, guess=found, template=name)
         return self

@@ -10,6 +10,7 @@ from ridetune.engine.mapping.apply import apply
 from ridetune.engine.mapping.mapping import (
     ChannelMapping,
     MappedColumn,
+    Places,
     mapping_from_json,
     mapping_to_json,
     read_mapping,
@@ -275,10 +276,10 @@ def test_a_template_made_of_one_file_reads_the_next():
     }
     template = guessed(renamed(truth(), names)).mapping
     later = renamed(truth(), dict(reversed(names.items())))
-    assert template.fits(later.columns)
+    assert template.fits(Places(later.columns))
     run = apply(mapping_from_json(mapping_to_json(template)), later)
     np.testing.assert_allclose(run["chassis.a_x"], truth()["chassis.a_x"], rtol=1e-12, atol=1e-15)
-    assert not template.fits(later.columns[:2])
+    assert not template.fits(Places(later.columns[:2]))
 
 
 @pytest.mark.parametrize(
@@ -307,6 +308,10 @@ def test_a_template_made_of_one_file_reads_the_next():
             "m.json: column a is both chassis.z and chassis.x; keep one of them.",
         ),
         ({"columns": [], "longest_gap": -1}, "m.json: longest_gap is -1, but must lie between"),
+        (
+            {"columns": [{"column": "a", "channel": "chassis.z", "unit": "m"}] * 1001},
+            "m.json: columns are more than 1000; map those that are used.",
+        ),
         ({"columns": [], "step": 100}, "m.json: step is 100, but must lie between"),
         ({"colums": []}, 'm.json: colums is not known; did you mean "columns"?'),
         ([], "m.json: must be an object"),
