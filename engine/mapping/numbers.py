@@ -38,9 +38,9 @@ MOST_STAND_INS = 4
 CENTRAL = (0.5, 99.5)
 """Percentiles between which the usual values lie."""
 
-CLIPPED_RUN, CLIPPED_RUNS, USUAL_RUNS = 5, 3, 4.0
+CLIPPED_RUN, CLIPPED_RUNS, TIMES_NEXT = 5, 3, 8.0
 """A column is clipped where it stays at its greatest value for so many samples, at least so often,
-and so many times longer than values usually repeat."""
+and so many times longer than at the value next to it; at the top of a rounded wave it is five."""
 
 
 class StandIn(NamedTuple):
@@ -80,6 +80,11 @@ class Statistics:
 
 def statistics(values: Array) -> Statistics:
     """What a column's numbers (samples,) say."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return _statistics(values)
+
+
+def _statistics(values: Array) -> Statistics:
     finite = values[np.isfinite(values)]
     found = stand_ins(finite)
     missing = values.size - finite.size
@@ -88,12 +93,11 @@ def statistics(values: Array) -> Statistics:
     if not finite.size:
         nan = math.nan
         return Statistics(values.size, nan, nan, nan, nan, nan, missing, found)
-    with np.errstate(over="ignore", invalid="ignore"):
-        peak, swing = (
-            float(np.percentile(np.abs(one), CENTRAL[1]))
-            for one in (finite, finite - np.median(finite))
-        )
-        step = float(np.median(np.diff(finite))) if finite.size > 1 else math.nan
+    peak, swing = (
+        float(np.percentile(np.abs(one), CENTRAL[1]))
+        for one in (finite, finite - np.median(finite))
+    )
+    step = float(np.median(np.diff(finite))) if finite.size > 1 else math.nan
     low, high = float(finite.min()), float(finite.max())
     return Statistics(
         *(values.size, low, high, peak, swing, step, missing, found),
@@ -137,8 +141,9 @@ def _is_clipped(values: Array, end: float) -> bool:
     long = at_end[at_end >= CLIPPED_RUN]
     if long.size < CLIPPED_RUNS:
         return False
-    usual = values.size / (1 + np.count_nonzero(np.diff(values)))
-    return bool(np.median(long) >= USUAL_RUNS * usual)
+    others = values[values != end]
+    beside = others[np.argmin(np.abs(others - end))]
+    return bool(np.median(long) >= TIMES_NEXT * np.mean(_runs(values == beside)))
 
 
 def _runs(holds: NDArray[np.bool_]) -> NDArray[np.int64]:

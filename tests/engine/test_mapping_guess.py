@@ -148,7 +148,7 @@ UNITS = {"m": ["m", "mm", "cm"], "rad": ["rad", "deg", "°"], "m/s": ["m/s", "km
 UNITS["m/s^2"] = ["m/s^2", "m/s²", "g"]
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=200, deadline=None)
 @given(data=st.data())
 def test_words_of_a_channel_are_found_however_they_are_written(data):
     """Subject and quantity in either order, joined in any style, in any unit of the quantity."""
@@ -162,7 +162,7 @@ def test_words_of_a_channel_are_found_however_they_are_written(data):
     assert proposed(name, unit) == (known, unit), name
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=200, deadline=None)
 @given(st.lists(st.tuples(st.text(max_size=60), st.text(max_size=12)), min_size=1, max_size=6))
 def test_any_header_is_taken_without_failing_and_no_channel_twice(header):
     found = guess([Column(name, unit, 100) for name, unit in header], {})
