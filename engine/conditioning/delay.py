@@ -23,7 +23,7 @@ from scipy.signal.windows import tukey
 from ..channels import Run
 from ..errors import ConditioningError
 from ..filters import in_band
-from ..measurement import FEWEST_SAMPLES
+from ..plausibility import FEWEST_SAMPLES
 from ..vehicle import Range, Vehicle
 from .done import Array, Done, history, require_band, require_even
 

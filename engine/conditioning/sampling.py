@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from ..channels import Run, channel
 from ..errors import ConditioningError
 from ..filters import is_uniform, low_pass
-from ..measurement import FEWEST_SAMPLES
+from ..plausibility import FEWEST_SAMPLES
 from ..spikes import spike_samples, spikes
 from ..vehicle import Range, Vehicle
 from .done import Array, Done, history, recorded
