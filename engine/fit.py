@@ -162,11 +162,13 @@ class Whiteness:
 
     statistic : greatest distance of the cumulative periodogram from that of white noise, 0 to 1
     p : probability of such a distance or a greater one, were they white
+    rms : of the residuals, in units of the noise
     effective_samples : independent samples that they are worth, of `samples`
     """
 
     run: str
     channel: str
+    rms: float
     statistic: float
     p: float
     effective_samples: float

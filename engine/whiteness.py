@@ -29,7 +29,10 @@ DOUBTFUL = 1e-6
 """Probability of such residuals, were they white, below which ..."""
 
 FEW_EFFECTIVE = 0.5
-"""... and share of effective samples below which something is said."""
+"""... and share of effective samples below which something is said, ..."""
+
+LEAST_RMS = 0.1
+"""... unless the residuals are smaller than this share of the noise: rounding has a colour too."""
 
 
 def whiteness(
@@ -52,6 +55,7 @@ def whiteness(
             Whiteness(
                 run=name,
                 channel=channel,
+                rms=float(np.sqrt(np.mean(residuals**2))),
                 statistic=statistic,
                 p=float(kstwobign.sf(np.sqrt(q - 1) * statistic)),
                 effective_samples=min(effective_samples(residuals, width), len(residuals)),
@@ -66,7 +70,9 @@ def whiteness_findings(tests: tuple[Whiteness, ...]) -> list[str]:
     coloured = [
         one
         for one in tests
-        if one.p < DOUBTFUL and one.effective_samples < FEW_EFFECTIVE * one.samples
+        if one.p < DOUBTFUL
+        and one.effective_samples < FEW_EFFECTIVE * one.samples
+        and one.rms > LEAST_RMS
     ]
     if not coloured:
         return []

@@ -81,5 +81,6 @@ def test_a_fit_tells_of_what_its_model_misses_and_of_nothing_else():
     assert "not noise in chassis.pitch" not in " ".join(missed.warnings)
 
 
-def test_nothing_is_said_of_a_channel_of_little_colour():
-    assert not whiteness_findings((Whiteness("lap", "chassis.z", 0.1, 1e-9, 900.0, 1000),))
+def test_nothing_is_said_of_a_channel_of_little_colour_or_of_rounding():
+    assert not whiteness_findings((Whiteness("lap", "chassis.z", 1.0, 0.1, 1e-9, 900.0, 1000),))
+    assert not whiteness_findings((Whiteness("lap", "chassis.z", 0.01, 0.9, 1e-9, 9.0, 1000),))
