@@ -22,7 +22,8 @@ from .uncertainty import RunResiduals, bandwidth, effective_samples
 Array = NDArray[np.float64]
 
 UNTOUCHED = 0.5
-"""Share of a low-pass's cutoff up to which it takes less than 2 % off the amplitude."""
+"""Share of a low-pass's cutoff up to which it takes less than 2 % off the amplitude; a high-pass
+does so from its cutoff over this share on."""
 
 FEWEST_FREQUENCIES = 10
 DOUBTFUL = 1e-6
@@ -43,9 +44,11 @@ def whiteness(
     found = []
     for channel, residuals in zip(channels, run.residuals, strict=True):
         periodogram = np.abs(np.fft.rfft(residuals)[1 : (len(residuals) + 1) // 2]) ** 2
-        if settings.output_cutoff_hz is not None:
-            seen = int(UNTOUCHED * settings.output_cutoff_hz * run.step * len(residuals))
-            periodogram = periodogram[:seen]
+        low, high = settings.output_band
+        lasts = run.step * len(residuals)
+        first = 0 if low is None else int(low / UNTOUCHED * lasts)
+        last = len(periodogram) if high is None else int(UNTOUCHED * high * lasts)
+        periodogram = periodogram[first:last]
         q, power = len(periodogram), float(np.sum(periodogram))
         if q < FEWEST_FREQUENCIES or power == 0.0:
             continue

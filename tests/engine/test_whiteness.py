@@ -54,12 +54,18 @@ def test_slow_residuals_are_far_from_white_and_worth_few_samples():
 
 
 def test_filtered_white_noise_is_white_where_the_filter_leaves_it():
-    """Oracle: noise without power above 20 Hz, white below."""
+    """Oracle: noise without power above 20 Hz, white below, and none below 5 Hz."""
     spectrum = np.fft.rfft(np.random.default_rng(2).normal(size=4000))
     spectrum[np.fft.rfftfreq(4000, 0.005) > 20.0] = 0.0
     filtered = np.fft.irfft(spectrum)
     assert bartlett(filtered).p < 1e-12
     assert bartlett(filtered, RimsSettings(output_cutoff_hz=20.0)).p > 0.01
+    slow = np.fft.rfftfreq(4000, 0.005) < 5.0
+    spectrum = np.where(slow, 0.0, np.fft.rfft(np.random.default_rng(3).normal(size=4000)))
+    filtered = np.fft.irfft(spectrum)
+    # The step of 0.05 over 2000 frequencies: p = 2 exp(-2 * 2000 * 0.05^2) = 1e-4.
+    assert bartlett(filtered).p < 1e-3
+    assert bartlett(filtered, RimsSettings(output_highpass_hz=5.0)).p > 0.01
 
 
 def test_a_fit_tells_of_what_its_model_misses_and_of_nothing_else():
