@@ -113,6 +113,10 @@ class Residuals:
         places = {one.name: place for place, one in enumerate(problem.free)}
         self._priors = [(one, places[one.name]) for one in problem.priors]
 
+    def of(self, problem: Problem) -> "Residuals":
+        """Those of another problem with the same model, under the same watch."""
+        return Residuals(problem, self._simulate, self._cancelled)
+
     def blocks(self) -> list[Block]:
         """The blocks of the residual vector, in order."""
         found, begin = [], 0

@@ -1,0 +1,117 @@
+"""Profiles of the stand-in, which is linear in the search's variables, and of valleys in it."""
+
+import math
+import threading
+
+import numpy as np
+import pytest
+from ridetune.engine.errors import Cancelled, ParameterError, ProblemError
+from ridetune.engine.identification import Problem, identify
+from ridetune.engine.parameters import PARAMETER_NAMES
+from ridetune.engine.profile import profile
+
+from .. import stand_in
+from ..factories import paper_vehicle
+
+CAR = paper_vehicle()
+SPRING, DAMPER = PARAMETER_NAMES[:2]
+ANGLE = "front.pivot.angle"
+
+
+def fitted(simulate=stand_in.simulate, runs=None, **named):
+    """A fit, and the problem that starts at its solution."""
+    runs = runs or [stand_in.recording(CAR, seed=4)]
+    fit = identify(Problem.build(CAR, runs, **named), simulate=simulate)
+    start = {one.name: one.value for one in fit.parameters}
+    bounds = {one.name: (one.lower, one.upper) for one in fit.parameters}
+    return fit, Problem.build(CAR, runs, **{**named, "start": start, "bounds": bounds})
+
+
+@pytest.mark.parametrize("name", [SPRING, ANGLE])
+def test_where_the_model_is_linear_a_profile_is_the_fit_s_interval(name):
+    """Oracle: a quadratic cost, so t is the change of the variable over its standard error. What
+    the search leaves of the cost, 1e-8 of it, is 1e-5 of t^2 at the first point."""
+    fit, problem = fitted()
+    found = profile(problem, name, simulate=stand_in.simulate)
+    one = next(each for each in fit.parameters if each.name == name)
+    assert found.confidence_interval == pytest.approx(one.confidence_interval, rel=1e-3)
+    free = one.free
+    error = one.std_error / free.slope(free.variable(one.value))
+    for point in found.points:
+        away = (free.variable(point.value) - free.variable(one.value)) / error
+        assert point.distance == pytest.approx(away, abs=1e-2)
+    assert found.points[0].distance < -found.quantile < found.quantile < found.points[-1].distance
+    assert not found.lower_at_bound
+    assert not found.upper_at_bound
+
+
+def test_the_others_follow_along_a_valley():
+    """Oracle: only the product of stiffness and damping acts, so along the whole profile it stays
+    and the cost with it; no end is found between the bounds."""
+
+    def simulate(cars, inputs, traction):
+        values = stand_in.values_of(cars)
+        merged = {
+            SPRING: values[SPRING] * values[DAMPER] / 1700.0,
+            DAMPER: np.full(len(cars), 1700.0),
+        }
+        return stand_in.histories(values | merged, inputs)
+
+    fit, problem = fitted(simulate, free=[SPRING, DAMPER], bounds={SPRING: (1e4, 6e4)})
+    found = profile(problem, SPRING, simulate=simulate)
+    product = fit.vehicle.value(SPRING) * fit.vehicle.value(DAMPER)
+    for point in found.points:
+        assert point.value * point.others[DAMPER] == pytest.approx(product, rel=1e-4)
+        assert abs(point.distance) < 0.1
+    assert found.confidence_interval == (-math.inf, math.inf)
+    assert found.lower_at_bound
+    assert found.upper_at_bound
+
+
+def test_a_bound_ends_a_profile_and_leaves_its_side_open():
+    """Oracle: the bound lies one error above the fit, where t is 1."""
+    fit, _ = fitted()
+    one = fit.parameters[0]
+    bound = one.value * math.exp(one.std_error / one.value)
+    _, problem = fitted(bounds={SPRING: (1e4, bound)})
+    found = profile(problem, SPRING, simulate=stand_in.simulate)
+    assert found.points[-1].value == pytest.approx(bound)
+    assert found.points[-1].distance == pytest.approx(1.0, abs=1e-2)
+    assert found.confidence_interval[1] == math.inf
+    assert found.confidence_interval[0] == pytest.approx(one.confidence_interval[0], rel=1e-3)
+    assert found.upper_at_bound
+    assert not found.lower_at_bound
+
+
+def test_a_parameter_by_itself_has_a_profile():
+    """Oracle: as above, with nothing else to fit."""
+    fit, problem = fitted(free=[SPRING])
+    found = profile(problem, "K_F", simulate=stand_in.simulate)
+    [one] = fit.parameters
+    assert found.confidence_interval == pytest.approx(one.confidence_interval, rel=1e-3)
+    assert not any(point.others for point in found.points)
+
+
+def test_points_are_told_of_and_a_profile_can_be_cancelled():
+    _, problem = fitted()
+    told = []
+    stop = threading.Event()
+
+    def progress(points):
+        told.append(points)
+        if len(told) == 3:
+            stop.set()
+
+    with pytest.raises(Cancelled):
+        profile(
+            problem, SPRING, progress=progress, cancelled=stop.is_set, simulate=stand_in.simulate
+        )
+    assert told == [1, 2, 3]
+
+
+def test_only_a_free_parameter_has_a_profile():
+    _, problem = fitted(free=[SPRING])
+    with pytest.raises(ProblemError, match=r"front\.suspension\.damping was not free"):
+        profile(problem, DAMPER)
+    with pytest.raises(ParameterError, match="No parameter is called 'K_X'"):
+        profile(problem, "K_X")
