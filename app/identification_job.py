@@ -16,7 +16,7 @@ from .recordings import Recordings, as_stated, with_braking
 from .schemas import IdentificationRequest
 from .settings import Limits
 from .store import Measurement, Store
-from .worker import Report
+from .worker import Report, Task
 
 KIND = "identification"
 
@@ -27,8 +27,8 @@ UNTOLD = {
 """What holds of a job kept from before these could be told."""
 
 
-def identification(store: Store, recordings: Recordings) -> Kind:
-    """The job kind, bound to where its recordings are kept."""
+def of_recordings(task: Task, store: Store, recordings: Recordings) -> Kind:
+    """A job kind whose specs are an identification's, bound to where its recordings are kept."""
 
     def payload(job: Job) -> dict[str, Any]:
         kept = [
@@ -36,7 +36,7 @@ def identification(store: Store, recordings: Recordings) -> Kind:
         ]
         return {**UNTOLD, **job.spec, "runs": marked_runs(job.spec, kept, recordings)}
 
-    return Kind(task=identify_runs, payload=payload)
+    return Kind(task=task, payload=payload)
 
 
 def as_asked(request: IdentificationRequest) -> str:

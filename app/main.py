@@ -19,6 +19,7 @@ from . import (
     routes_mappings,
     routes_measurements,
     routes_page,
+    routes_profiles,
     routes_sessions,
     routes_simulations,
     routes_sweeps,
@@ -29,11 +30,13 @@ from .campaign_job import campaign
 from .cluster import Cluster
 from .guard import Guard
 from .identification_job import KIND as IDENTIFICATION
-from .identification_job import identification
+from .identification_job import identify_runs, of_recordings
 from .interactive import Interactive
 from .jobs import Jobs
 from .package_files import package_folder
 from .problems import reply_to_errors
+from .profile_job import KIND as PROFILE
+from .profile_job import profile_parameter
 from .recordings import Recordings
 from .services import Services, Viewers
 from .settings import Settings
@@ -89,6 +92,7 @@ def create_app(
         routes_mappings,
         routes_identifications,
         routes_sweeps,
+        routes_profiles,
         routes_validations,
         routes_campaigns,
         routes_page,
@@ -121,7 +125,8 @@ def _services(
             Cluster(settings.cluster, store.directory.scratch),
             {
                 CAMPAIGN: campaign(),
-                IDENTIFICATION: identification(store, recordings),
+                IDENTIFICATION: of_recordings(identify_runs, store, recordings),
+                PROFILE: of_recordings(profile_parameter, store, recordings),
                 SWEEP: sweep(store, recordings),
                 VALIDATION: validation(store, recordings),
             },

@@ -267,6 +267,17 @@ class ValidationRequest(WireForm):
     key: Name | None = None
 
 
+class ProfileRequest(WireForm):
+    """How well a fit holds one parameter: hold it elsewhere, fit all others anew.
+
+    parameter : name or symbol, of one that was free
+    """
+
+    identification: Name
+    parameter: Name
+    key: Name | None = None
+
+
 class IdentificationRequest(WireForm):
     """Find parameters of the session's car (or of another start) from measurements.
 

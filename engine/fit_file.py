@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from .fit import Fit, ParameterEstimate
+from .profile import Profile
 from .step_record import step_record_to_json
 from .vehicle_file import vehicle_to_json
 
@@ -56,6 +57,11 @@ def fit_to_json(fit: Fit) -> dict[str, Any]:
             "evaluations": fit.evaluations,
         }
     )
+
+
+def profile_to_json(found: Profile) -> dict[str, Any]:
+    """A profile; null for an end of the interval that is open."""
+    return plain(asdict(found))
 
 
 def write_fit(fit: Fit, path: Path | str) -> None:

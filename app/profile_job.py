@@ -1,0 +1,48 @@
+"""The profile of one parameter of a fit as a background job: what it needs, and what it does."""
+
+from collections.abc import Callable
+from typing import Any
+
+from ..engine.errors import ProblemError
+from ..engine.parameters import parameter
+from .errors import Conflict
+from .identification_job import build_problem
+from .job_store import Job
+from .schemas import ProfileRequest
+from .worker import Report
+
+KIND = "profile"
+
+
+def check_and_fill(request: ProfileRequest, fitted: Job) -> dict[str, Any]:
+    """Everything that the job needs, checked: what the fit was asked, from where it ended."""
+    if fitted.result is None:
+        raise Conflict(
+            f"The identification has no fit, its state is {fitted.state}; wait, or fit again."
+        )
+    ended = {one["name"]: one["value"] for one in fitted.result["parameters"]}
+    name = parameter(request.parameter).name
+    if name not in ended:
+        raise ProblemError(f"{name} was not free in this fit; free are {', '.join(ended)}.")
+    return {
+        **{key: value for key, value in fitted.spec.items() if key not in ("asked", "starts")},
+        "identification": fitted.id,
+        "parameter": name,
+        "start": {**fitted.spec["start"], **ended},
+    }
+
+
+def profile_parameter(
+    payload: Any, report: Report, cancelled: Callable[[], bool]
+) -> dict[str, Any]:
+    """On the worker: the profile as JSON, reporting after every point."""
+    from ..engine.fit_file import profile_to_json
+    from ..engine.profile import profile
+
+    found = profile(
+        build_problem(payload, payload["runs"]),
+        payload["parameter"],
+        progress=lambda points: report({"points": points}),
+        cancelled=cancelled,
+    )
+    return profile_to_json(found)

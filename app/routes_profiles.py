@@ -1,0 +1,31 @@
+"""Profiles of a fit's parameters: background jobs, one a parameter."""
+
+from typing import Any
+
+from .access import SessionId
+from .identification_job import KIND as IDENTIFICATION
+from .job_routes import View, job_router, submitted
+from .jobs import as_asked
+from .profile_job import KIND, check_and_fill
+from .schemas import ProfileRequest
+from .services import Services, Shared
+
+VIEW = View(
+    KIND,
+    asked=lambda job: {name: job.spec[name] for name in ("identification", "parameter")},
+    result=lambda job: {"result": job.result},
+)
+
+router = job_router("profiles", VIEW)
+
+
+@router.post("", status_code=202)
+async def submit(sid: SessionId, services: Shared, body: ProfileRequest) -> dict[str, Any]:
+    """Queue the profile of a parameter of an identification that is done."""
+    return await submitted(
+        services, sid, VIEW, body.key, lambda: as_asked(body), lambda: _spec(services, sid, body)
+    )
+
+
+def _spec(services: Services, sid: str, body: ProfileRequest) -> dict[str, Any]:
+    return check_and_fill(body, services.jobs.get(sid, body.identification, IDENTIFICATION))
