@@ -234,6 +234,13 @@ def _describe_condition(command: Parser) -> None:
 
 def _describe_identify(command: Parser) -> None:
     _add_identification(command)
+    command.add_argument(
+        "--profile",
+        metavar="NAME",
+        nargs="+",
+        action="extend",
+        help="intervals by profile likelihood, too",
+    )
     command.add_argument("-o", "--output", metavar="FILE", help="the fit as JSON")
 
 

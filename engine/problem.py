@@ -6,7 +6,7 @@ of the rims mode once for all of them.
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar, get_args
 
 import numpy as np
@@ -132,6 +132,11 @@ class Problem:
             for name, prior in _by_name(priors or {}, "prior").items()
         )
         return cls(vehicle, compared, parameters, traction, settings, loss or Loss(), known)
+
+    def started_at(self, values: Mapping[str, float]) -> "Problem":
+        """The same problem from other start values, by name, of the free parameters."""
+        free = tuple(replace(one, start=values[one.name]) for one in self.free)
+        return replace(self, vehicle=self.vehicle.with_values(values), free=free)
 
     def values(self, x: Array) -> Array:
         """The free parameters at the optimiser's variables x."""

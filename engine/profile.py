@@ -14,7 +14,7 @@ open towards a side on which t never gets there.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -102,10 +102,8 @@ def profile(
     and Cancelled.
     """
     known = parameter(name).name
-    names = [one.name for one in problem.free]
-    if known not in names:
-        raise ProblemError(f"{known} was not free in this fit; free are {', '.join(names)}.")
-    held = names.index(known)
+    require_free(problem, [known])
+    held = [one.name for one in problem.free].index(known)
     residuals = Residuals(problem, simulate, cancelled)
     start = [one.variable(one.start) for one in problem.free]
     best = Search(residuals).refine(_off_bounds(start, residuals), EVALUATIONS)
@@ -130,6 +128,14 @@ def profile(
         upper_at_bound=one.upper - points[-1].value < span,
         simulations=tour.simulations,
     )
+
+
+def require_free(problem: Problem, names: Iterable[str]) -> None:
+    """Raise ProblemError for a parameter that a problem does not free."""
+    free = [one.name for one in problem.free]
+    for name in names:
+        if name not in free:
+            raise ProblemError(f"{name} was not free in this fit; free are {', '.join(free)}.")
 
 
 class _Tour:

@@ -8,10 +8,11 @@ from collections.abc import Sequence
 
 from ...engine.channels import Run
 from ...engine.fit import Fit, Progress
-from ...engine.fit_file import fit_to_json
+from ...engine.fit_file import fit_to_json, profile_to_json
 from ...engine.identification import identify as fit_to_runs
 from ...engine.parameters import DAMPER_NAMES, PARAMETER_NAMES, parameter
 from ...engine.problem import Problem
+from ...engine.profile import Profile, profile, require_free
 from ...engine.vehicle import Vehicle
 from .arguments import bounds, loss, priors, rims_settings, starts, whole
 from .inputs import find_mapping, find_vehicle, read_noise, read_runs, recording_files
@@ -33,15 +34,22 @@ def identify(options: Namespace) -> None:
     vehicle = find_vehicle(options.vehicle)
     mapping = find_mapping(options.mapping)
     runs = read_runs(options.runs, options.braking or (), mapping, noise=noise)
-    fit = fitted(options, vehicle, runs)
+    problem = asked(options, vehicle, runs)
+    profiled = [parameter(name).name for name in options.profile or ()]
+    require_free(problem, profiled)
+    fit = fitted(options, problem)
     print_fit(fit)
+    solved = problem.started_at({one.name: one.value for one in fit.parameters})
+    profiles = [profile(solved, name) for name in profiled]
+    _print_profiles(profiles)
     if options.output:
-        write_file(options.output, json.dumps(fit_to_json(fit), indent=2) + "\n")
+        told = {**fit_to_json(fit), "profiles": [profile_to_json(one) for one in profiles]}
+        write_file(options.output, json.dumps(told, indent=2) + "\n")
 
 
-def fitted(options: Namespace, vehicle: Vehicle, runs: Sequence[Run]) -> Fit:
-    """The fit to some runs that the options describe, with its progress on a terminal."""
-    problem = Problem.build(
+def asked(options: Namespace, vehicle: Vehicle, runs: Sequence[Run]) -> Problem:
+    """What the options ask to be fitted to some runs."""
+    return Problem.build(
         vehicle,
         runs,
         _free(options),
@@ -53,6 +61,10 @@ def fitted(options: Namespace, vehicle: Vehicle, runs: Sequence[Run]) -> Fit:
         loss=loss(options),
         priors=priors(options.prior),
     )
+
+
+def fitted(options: Namespace, problem: Problem) -> Fit:
+    """The fit, with its progress on a terminal."""
     watched = sys.stderr.isatty()
     fit = fit_to_runs(
         problem,
@@ -107,6 +119,22 @@ def print_fit(fit: Fit) -> None:
     for sentence in fit.verdict.sentences:
         print(sentence)
     print_warnings(fit.warnings)
+
+
+def _print_profiles(profiles: Sequence[Profile]) -> None:
+    """Print the intervals by profile likelihood; "open" where the runs never object."""
+    if not profiles:
+        return
+    rows = [("profile", "from", "to", "unit")]
+    for one in profiles:
+        low, high = (_shown_end(end) for end in one.confidence_interval)
+        rows.append((one.name, low, high, parameter(one.name).unit))
+    print()
+    print_table(rows, right=(1, 2))
+
+
+def _shown_end(end: float) -> str:
+    return significant(end, 5) if math.isfinite(end) else "open"
 
 
 def _print_minima(fit: Fit) -> None:

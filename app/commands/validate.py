@@ -23,7 +23,7 @@ from ...engine.validation import validate as predict
 from ...engine.validation_file import validation_to_json
 from ..report import made, report
 from .arguments import ArgumentError, place_of, rims_settings
-from .identify import fitted, print_fit
+from .identify import asked, fitted, print_fit
 from .inputs import (
     find_manoeuvre,
     find_mapping,
@@ -48,7 +48,7 @@ def validate(options: Namespace) -> None:
     runs = read_runs(paths, options.braking or (), mapping, noise=noise)
     cases = _cases(runs, len(options.runs), _manoeuvres(options.manoeuvre, paths))
     check_cases(cases)
-    fit = fitted(options, vehicle, runs[: len(options.runs)])
+    fit = fitted(options, asked(options, vehicle, runs[: len(options.runs)]))
     print_fit(fit)
     validation = predict(
         fit.vehicle,

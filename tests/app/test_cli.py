@@ -32,6 +32,7 @@ SHORT = {
     "seed": 1,
 }
 RECORDED = list(SENSED)
+TWIN = Path(__file__).parents[2] / "sample_runs/twin/manoeuvre_1.csv"
 
 
 @pytest.fixture
@@ -657,3 +658,23 @@ def test_serve_answers_until_interrupted(folder):
         finally:
             service.send_signal(signal.SIGINT)
         assert service.wait(timeout=60) == 0
+
+
+def test_identify_profiles_a_parameter(folder, capsys):
+    """Oracle: the fit's own interval, as springs move the twin in proportion."""
+    options = "--vehicle paper --free K_F K_R --profile K_F -o fit.json"
+    assert main(["identify", str(TWIN), *options.split()]) == 0
+    document = json.loads((folder / "fit.json").read_text())
+    [found], estimate = document["profiles"], document["parameters"][0]
+    assert found["name"] == estimate["name"] == "front.suspension.stiffness"
+    low, high = estimate["confidence_interval"]
+    assert found["confidence_interval"] == pytest.approx([low, high], abs=0.02 * (high - low))
+    printed = capsys.readouterr().out
+    assert re.search(r"^front\.suspension\.stiffness +2\S+ +2\S+ +N/m$", printed, re.MULTILINE)
+
+
+def test_only_what_is_free_is_profiled(capsys):
+    message = refused(
+        capsys, "identify", str(TWIN), *["--vehicle", "paper", "--free", "K_F", "--profile", "d_F"]
+    )
+    assert "front.pivot.distance was not free in this fit; free are" in message
