@@ -50,6 +50,7 @@ from scipy.stats import t as student_t
 from .condensed import triangle
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 DIRECTION_TOLERANCE = 1e-7
 """Relative singular value below which a direction is undetermined; above the error, about 1e-9,
@@ -160,7 +161,7 @@ def information(runs: Iterable[RunResiduals]) -> Information:
     runs = list(runs)
     n = runs[0].jacobian.shape[2]
     root = triangle(np.concatenate([run.jacobian.reshape(-1, n) for run in runs]))
-    bread = _bread(root)[0]
+    bread = bread_of(root)[0]
     widths = [bandwidth(run.residuals, run.step) for run in runs]
     scatters = [_scatter(run, width, bread) for run, width in zip(runs, widths, strict=True)]
     return Information(
@@ -177,7 +178,7 @@ def information(runs: Iterable[RunResiduals]) -> Information:
 
 def uncertainty(known: Information) -> Uncertainty:
     """Errors at a least-squares solution."""
-    bread, unknown, least = _bread(known.root)
+    bread, unknown, least = bread_of(known.root)
     covariance = bread @ known.scatter @ bread
     effect = np.linalg.norm(known.root, axis=0)
     scattered = np.sqrt(np.maximum(np.diag(known.scatter), 0.0))
@@ -188,7 +189,7 @@ def uncertainty(known: Information) -> Uncertainty:
     return Uncertainty(covariance, unknown, quantile, alone)
 
 
-def _bread(root: Array) -> tuple[Array, Array, float]:
+def bread_of(root: Array) -> tuple[Array, Array, float]:
     """B over the directions which the runs move, the others (k, n), and their largest effect."""
     _, singular, directions = np.linalg.svd(root)
     least = max(DIRECTION_TOLERANCE * singular[0], LEAST_EFFECT)
@@ -224,23 +225,59 @@ def effective_samples(residuals: Array, width: float) -> float:
     return len(residuals) / (2.0 * float(np.sum((smoothed / smoothed[0]) ** 2)) - 1.0)
 
 
-def _scatter(run: RunResiduals, width: float, bread: Array) -> Array:
-    """A run's part of M, of all its pairs of channels."""
-    channels, count, n = run.jacobian.shape
-    length = _fast_length(count + int(np.ceil(width)))
+def transform_length(count: int, width: float) -> int:
+    """Of Fourier transforms of so many samples, correlated over `width` lags, that do not wrap."""
+    return _fast_length(count + int(np.ceil(width)))
+
+
+def spectra(run: RunResiduals, width: float, bread: Array) -> Complex:
+    """Spectra of the noise behind a run's residuals, (channels, channels, frequencies).
+
+    Two-sided and by sample: white noise of variance s^2 has s^2 at every frequency. The
+    frequencies are those of the real transform of `transform_length`.
+    bread : (n, n) B of the fit that took its part out of the residuals
+    """
+    channels, count, _ = run.jacobian.shape
+    length = transform_length(count, width)
     jacobian = np.fft.rfft(run.jacobian, length, axis=1)
     left = np.sqrt([_left(of_channel, bread, count, width, length) for of_channel in jacobian])
-    weights = np.full(jacobian.shape[1], 2.0)
+    pairs = [
+        [_spectrum(run.residuals[a], run.residuals[b], width, length) for b in range(channels)]
+        for a in range(channels)
+    ]
+    return np.array(pairs) / (left[:, np.newaxis] * left)
+
+
+def scatter(jacobian: Array, density: Complex, length: int) -> Array:
+    """M (n, n) of a run whose noise has some spectra.
+
+    jacobian : (channels, samples, n);  density : of `spectra`, for transforms of `length`
+    """
+    transformed = np.fft.rfft(jacobian, length, axis=1)
+    weights = np.full(transformed.shape[1], 2.0)
     weights[0] = 1.0
     if length % 2 == 0:
         weights[-1] = 1.0
-    scatter = np.zeros((n, n))
-    for a in range(channels):
-        for b in range(channels):
-            spectrum = _spectrum(run.residuals[a], run.residuals[b], width, length)
-            weighted = weights * spectrum / (left[a] * left[b])
-            scatter += (jacobian[a].conj().T @ (weighted[:, np.newaxis] * jacobian[b])).real
-    return scatter / length
+    weighted = np.zeros_like(transformed)
+    for a, of_channel in enumerate(density):
+        for b, of_pair in enumerate(of_channel):
+            weighted[a] += (weights * of_pair)[:, np.newaxis] * transformed[b]
+    return _product(transformed, weighted) / length
+
+
+def _product(one: Complex, other: Complex) -> Array:
+    """Real part of one^H other, (n, n), of transforms (channels, frequencies, n).
+
+    By loops: BLAS wakes its threads for complex numbers and waits for them where cores are busy.
+    """
+    real = np.einsum("cfi,cfj->ij", one.real, other.real)
+    return real + np.einsum("cfi,cfj->ij", one.imag, other.imag)
+
+
+def _scatter(run: RunResiduals, width: float, bread: Array) -> Array:
+    """A run's part of M, of all its pairs of channels."""
+    length = transform_length(run.residuals.shape[1], width)
+    return scatter(run.jacobian, spectra(run, width, bread), length)
 
 
 def _left(jacobian: Array, bread: Array, count: int, width: float, length: int) -> Array:
@@ -255,7 +292,7 @@ def _left(jacobian: Array, bread: Array, count: int, width: float, length: int) 
     return np.maximum(1.0 - share, LEAST_LEFT)
 
 
-def _spectrum(one: Array, other: Array, width: float, length: int) -> NDArray[np.complex128]:
+def _spectrum(one: Array, other: Array, width: float, length: int) -> Complex:
     """Fourier transform of two channels' smoothed covariance over lags of both signs."""
     ahead = np.fft.rfft(smoothed_covariance(one, other, width), length)
     behind = smoothed_covariance(other, one, width)
