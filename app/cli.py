@@ -93,6 +93,7 @@ def command_line() -> "Parser":
     _describe_condition(add("condition", _condition, "Make a fit's inputs of a raw recording."))
     _describe_identify(add("identify", _identify, "Identify a car's parameters from recordings."))
     _describe_validate(add("validate", _validate, "Identify a car and report what it predicts."))
+    _describe_advise(add("advise", _advise, "Tell which manoeuvre to drive next."))
     _describe_campaign(add("campaign", _campaign, "Measure a car that is known, as files."))
     _describe_bench(add("bench", _bench, "Measure the engine and its peers on this machine."))
     return parser
@@ -263,6 +264,20 @@ def _describe_validate(command: Parser) -> None:
     command.add_argument(
         "-o", "--output", metavar="FILE", required=True, help="the report, one HTML file"
     )
+
+
+def _describe_advise(command: Parser) -> None:
+    command.add_argument("runs", metavar="RUN", nargs="*", help="recordings so far, CSV")
+    _add_vehicle(command)
+    several = {"nargs": "+", "action": "extend", "default": []}
+    command.add_argument(
+        "--candidates", metavar="NAME", **several, help="known manoeuvres or files; many untold"
+    )
+    command.add_argument(
+        "--planned", metavar="NAME", **several, help="manoeuvres that will be driven in any case"
+    )
+    _add_noise(command, "noise of the recordings and, without any, of the sensors")
+    command.add_argument("--json", metavar="FILE", help="the advice as JSON")
 
 
 def _add_identification(command: Parser) -> None:
@@ -453,6 +468,12 @@ def _validate(options: argparse.Namespace) -> None:
     from .commands.validate import validate
 
     validate(options)
+
+
+def _advise(options: argparse.Namespace) -> None:
+    from .commands.advise import advise
+
+    advise(options)
 
 
 def _campaign(options: argparse.Namespace) -> None:

@@ -12,6 +12,7 @@ from fastapi import FastAPI
 from fastapi.staticfiles import StaticFiles
 
 from . import (
+    routes_advice,
     routes_campaigns,
     routes_catalogue,
     routes_conditioning,
@@ -94,6 +95,7 @@ def create_app(
         routes_sweeps,
         routes_profiles,
         routes_validations,
+        routes_advice,
         routes_campaigns,
         routes_page,
     ):

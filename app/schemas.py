@@ -217,6 +217,22 @@ class CampaignRequest(WireForm):
     key: Name | None = None
 
 
+class AdviceRequest(WireForm):
+    """What to drive next, after an identification that is done or before there is any run.
+
+    vehicle : in place of the session's, where there is no identification
+    candidates : keys of known manoeuvres, or by key a known one's or an object; the usual ones
+    planned : keys of those that will be driven in any case
+    noise : standard deviation by channel of the sensors, SI, where there is no identification
+    """
+
+    identification: Name | None = None
+    vehicle: JsonObject | None = None
+    candidates: Manoeuvres | None = None
+    planned: Annotated[list[Name], Field(max_length=20)] = []
+    noise: Annotated[dict[Name, Annotated[Number, Field(ge=0, le=1e6)]], Field(max_length=50)] = {}
+
+
 class RoadPreview(WireForm):
     """A road as a manoeuvre would build it, seen from above the car at rest."""
 

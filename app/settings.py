@@ -37,6 +37,7 @@ class Limits:
     simulated_seconds: float = 600.0
     simulated_steps: int = 400_000
     identified_samples: int = 400_000
+    advised_seconds: float = 1000.0
     swept_cars: int = 100_000
     swept_steps: int = 2_000_000_000
     driven_seconds: float = 600.0

@@ -1,0 +1,111 @@
+"""`ridetune advise`: which manoeuvre to drive next, and what it would tell."""
+
+import json
+import math
+from argparse import Namespace
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from ...engine.advice_file import advisory_to_json
+from ...engine.advisor import Advisory, advise_unmeasured
+from ...engine.advisor import advise as advise_after
+from ...engine.candidates import catalogue
+from ...engine.errors import VehicleError
+from ...engine.identification import identify
+from ...engine.json_text import read_json
+from ...engine.kept_fit import fit_from_json, is_fit
+from ...engine.manoeuvre import Manoeuvre
+from ...engine.parameters import parameter
+from ...engine.problem import Problem
+from .inputs import find_manoeuvre, find_vehicle, read_noise, read_runs, recording_files
+from .output import print_table, require_place, significant, write_file
+
+
+def advise(options: Namespace) -> None:
+    """Rank the candidates, print the report, write the advice."""
+    inputs = (options.vehicle, options.noise, *recording_files(options.runs))
+    require_place(options.json, (*inputs, *options.candidates, *options.planned))
+    candidates = _candidates(options)
+    planned = tuple(map(_key, options.planned))
+    noise = read_noise(options.noise)
+    if options.runs:
+        found = advise_after(_problem(options, noise), candidates, planned=planned)
+    else:
+        vehicle = find_vehicle(options.vehicle)
+        found = advise_unmeasured(vehicle, candidates, planned=planned, noise=noise)
+        print("Without recordings, nothing is known but what is planned.")
+    print_advisory(found)
+    if options.json:
+        write_file(options.json, json.dumps(advisory_to_json(found), indent=2) + "\n")
+
+
+def _candidates(options: Namespace) -> dict[str, Manoeuvre]:
+    """Those named, or the usual ones, with what is planned among them."""
+    known = catalogue()
+    names = [*(options.candidates or known), *options.planned]
+    return {_key(name): known.get(name) or find_manoeuvre(name) for name in names}
+
+
+def _key(name: str) -> str:
+    """A candidate's key: that of a known one, or the name of a file without its ending."""
+    return Path(name).stem if Path(name).is_file() else name
+
+
+def _problem(options: Namespace, noise: Mapping[str, float]) -> Problem:
+    """The problem of the runs at fitted values: those of a fit's file, else fitted now."""
+    runs = read_runs(options.runs, (), noise=noise)
+    data = read_json(Path(options.vehicle), VehicleError) if _is_json(options.vehicle) else None
+    if not is_fit(data):
+        problem = Problem.build(find_vehicle(options.vehicle), runs)
+        fit = identify(problem)
+        print(fit.outcome)
+        return replace(
+            problem,
+            vehicle=fit.vehicle,
+            free=tuple(replace(one.free, start=one.value) for one in fit.parameters),
+        )
+    fit = fit_from_json(data, Path(options.vehicle).name)
+    return Problem.build(
+        fit.vehicle,
+        [replace(run, braking=fit.braking.get(run.name) or run.braking) for run in runs],
+        [one.name for one in fit.free],
+        bounds={one.name: (one.lower, one.upper) for one in fit.free},
+        traction=fit.traction,
+        settings=fit.settings,
+    )
+
+
+def _is_json(name: str) -> bool:
+    return Path(name).is_file()
+
+
+def print_advisory(found: Advisory) -> None:
+    """Print what is known, then the candidates by rank."""
+    best = found.ranked[0] if found.ranked else None
+    rows = [("parameter", "error %", "determined", *((f"after {best.key} %",) if best else ()))]
+    for place, one in enumerate(found.now):
+        after = (_percent(best.after[place].relative),) if best else ()
+        symbol = parameter(one.name).symbol
+        rows.append((symbol, _percent(one.relative), one.determined, *after))
+    print_table(rows, right=(1, 3))
+    print()
+    rows = [("candidate", "rises", "bits", "what it would tell (standard errors)")]
+    for advice in found.ranked:
+        rows.append(
+            (advice.key, str(advice.promoted), significant(advice.gain, 2), advice.sentence)
+        )
+    print_table(rows, right=(1, 2))
+    for advice in found.ranked:
+        if advice.remark:
+            print(f"{advice.key}: {advice.remark}")
+    for key, why in found.excluded.items():
+        print(f"{key}: {why}")
+    if len(found.together) > 1:
+        print(f"Together: {', then '.join(one.key for one in found.together)}.")
+        for advice in found.together[1:]:
+            print(f"  {advice.sentence}")
+
+
+def _percent(relative: float) -> str:
+    return significant(100.0 * relative, 2) if math.isfinite(relative) else "unknown"

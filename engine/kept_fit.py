@@ -1,0 +1,97 @@
+"""A fit read back from its JSON: the car, what was free, and how well it is known."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .braking import Interval
+from .errors import ProblemError, RideError
+from .json_text import read_json
+from .parameters import parameter
+from .problem import FreeParameter
+from .rims_settings import RimsSettings
+from .simulation import Traction
+from .uncertainty import Uncertainty
+from .vehicle import Vehicle
+from .vehicle_file import vehicle_from_json
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KeptFit:
+    """A fit without its runs.
+
+    vehicle : with the fitted values
+    free : what was free, with the search's variables
+    errors : of these variables
+    braking : where the car was taken to brake, by the runs' names, s
+    """
+
+    vehicle: Vehicle
+    free: tuple[FreeParameter, ...]
+    errors: Uncertainty
+    traction: Traction
+    settings: RimsSettings
+    braking: Mapping[str, tuple[Interval, ...]]
+
+    @property
+    def x(self) -> Array:
+        """(n,) the search's variables at the solution."""
+        return np.array([one.variable(self.vehicle.value(one.name)) for one in self.free])
+
+
+def is_fit(data: Any) -> bool:
+    """Whether parsed JSON is a fit rather than a vehicle."""
+    return isinstance(data, Mapping) and "vehicle" in data and "parameters" in data
+
+
+def read_fit(path: str | Path) -> KeptFit:
+    """Read a fit's file; ProblemError names what it lacks."""
+    path = Path(path)
+    return fit_from_json(read_json(path, ProblemError), path.name)
+
+
+def fit_from_json(data: Any, source: str = "fit") -> KeptFit:
+    """A fit from parsed JSON; `source` heads every message."""
+    if not is_fit(data):
+        raise ProblemError(f"{source}: this is no fit; give what an identification wrote.")
+    vehicle = vehicle_from_json(data, source)
+    try:
+        free = tuple(
+            FreeParameter(
+                parameter(row["name"]).name,
+                *(float(row[name]) for name in ("start", "lower", "upper")),
+            )
+            for row in data["parameters"]
+        )
+        n = len(free)
+        errors = Uncertainty(
+            np.array(data["covariance"], dtype=np.float64).reshape(n, n),
+            np.array(data["unknown"], dtype=np.float64).reshape(-1, n),
+            float(data["quantile"]),
+            np.full(n, np.nan),
+        )
+        kept = KeptFit(
+            vehicle,
+            free,
+            errors,
+            cast(Traction, data["traction"]),
+            RimsSettings(**data["settings"]),
+            {
+                run["name"]: tuple((float(begin), float(end)) for begin, end in run["braking"])
+                for run in data["runs"]
+            },
+        )
+        finite = np.all(np.isfinite(errors.covariance)) and np.all(np.isfinite(kept.x))
+    except (KeyError, TypeError, ValueError, IndexError, RideError) as error:
+        raise ProblemError(
+            f"{source}: this fit cannot be read ({error}); write it anew with ridetune identify."
+        ) from error
+    if not (finite and n):
+        raise ProblemError(f"{source}: the fit's covariance is not finite; fit anew.")
+    return kept

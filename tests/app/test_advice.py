@@ -1,0 +1,63 @@
+"""Advice over REST: before any run, after an identification, and what is refused."""
+
+import pytest
+from ridetune.app.settings import Limits, Settings
+from ridetune.engine.vehicle_file import reference_vehicles, vehicle_to_json
+
+from .conftest import SAMPLES, Visitor, open_client
+
+PAPER = vehicle_to_json(reference_vehicles()["paper"])
+
+
+@pytest.fixture(scope="module")
+def engineer(tmp_path_factory):
+    """A session on a service with workers of its own."""
+    settings = Settings(data=tmp_path_factory.mktemp("advice"), limits=Limits(advised_seconds=100))
+    with open_client(settings) as client:
+        yield Visitor(client)
+
+
+def test_a_plan_before_any_run(engineer):
+    """Oracle: nothing but braking moves the front pivot's angle much (docs/advice.md)."""
+    own = {"name": "Mine", "kind": "road", "duration": 2}
+    asked = {"candidates": {"brake-54": "brake-54", "own": own}, "planned": ["1", "2"]}
+    reply = engineer.post("/advice", json=asked | {"noise": {"wheel.fl.z": 0.0}})
+    assert reply.status_code == 200, reply.text
+    told = reply.json()
+    assert [one["key"] for one in told["candidates"]] == ["brake-54", "own"]
+    assert len(told["now"]["parameters"]) == 12
+    assert told["candidates"][0]["parameters"][0]["unit"] == "N/m"
+    assert "phi_F from" in told["candidates"][0]["sentence"]
+
+
+def test_advice_after_an_identification(engineer):
+    """Oracle: the errors of that fit."""
+    file = SAMPLES / "twin/manoeuvre_1.csv"
+    run = engineer.upload(file.read_bytes(), file.name).json()["id"]
+    asked = {"runs": [run], "vehicle": PAPER, "free": ["K_F", "K_R", "phi_F"]}
+    job = engineer.post("/identifications", json=asked).json()
+    assert engineer.post("/advice", json={"identification": "gone"}).status_code == 404
+    done = engineer.wait_for("identifications", job["id"])
+    asked = {"identification": job["id"], "candidates": ["brake-54"]}
+    told = engineer.post("/advice", json=asked).json()
+    for one, other in zip(told["now"]["parameters"], done["result"]["parameters"], strict=True):
+        assert one["name"] == other["name"]
+        assert one["std_error"] == pytest.approx(other["std_error"], rel=0.01)
+    refused = engineer.post("/advice", json=asked | {"vehicle": PAPER})
+    assert (refused.status_code, refused.json()["field"]) == (422, "vehicle")
+
+
+@pytest.mark.parametrize(
+    ("asked", "status", "said"),
+    [
+        ({"candidates": ["1", "2", "roll", "warp"]}, 422, "last 120 s together"),
+        ({"candidates": ["brake-5"]}, 404, "did you mean brake-54?"),
+        ({"candidates": ["heave"], "noise": {"chassis.v_x": 1.0}}, 422, "chassis.v_x; it counts"),
+        ({"candidates": 3}, 422, "give a list of known manoeuvres' keys"),
+        ({"candidates": {"x": {"name": "X"}}}, 422, "kind"),
+    ],
+)
+def test_refusals(engineer, asked, status, said):
+    reply = engineer.post("/advice", json=asked)
+    assert reply.status_code == status, reply.text
+    assert said in reply.json()["detail"]
