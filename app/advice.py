@@ -13,9 +13,9 @@ from ..engine.candidates import catalogue
 from ..engine.channels import INPUT_CHANNELS, OUTPUT_CHANNELS
 from ..engine.manoeuvre import Manoeuvre, manoeuvre_from_json
 from ..engine.vehicle_file import vehicle_from_json
-from .errors import Conflict, InvalidRequest, OverBudget
+from .errors import InvalidRequest, OverBudget
 from .excitation import known_manoeuvre
-from .identification_job import build_problem, marked_runs
+from .identification_job import build_problem, done, marked_runs
 from .job_store import Job
 from .recordings import Recordings
 from .schemas import AdviceRequest
@@ -55,11 +55,7 @@ def advice(
             f"The field {told} means nothing with identification, which has its own; leave it out.",
             field=told,
         )
-    if fitted.result is None:
-        raise Conflict(
-            f"The identification has no fit, its state is {fitted.state}; wait, or fit again."
-        )
-    spec = {**fitted.spec, "vehicle": fitted.result["vehicle"], "start": {}}
+    spec = {**fitted.spec, "vehicle": done(fitted)["vehicle"], "start": {}}
     kept = [store.measurement(session, run["id"]) for run in spec["runs"]]
     stated = [replace(one, noise=run["noise"]) for one, run in zip(kept, spec["runs"], strict=True)]
     problem = build_problem(spec, marked_runs(spec, stated, recordings))

@@ -176,6 +176,11 @@ def _describe_simulate(command: Parser) -> None:
     command.add_argument(
         "--seed", metavar="N", type=_seed, dest="road_seed", help="another random road"
     )
+    command.add_argument(
+        "--bands",
+        choices=("linear", "sampled"),
+        help="95 %% bands by the errors of the fit that --vehicle is",
+    )
     command.add_argument("-o", "--output", metavar="FILE", help="the run as CSV")
 
 

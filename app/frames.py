@@ -31,6 +31,9 @@ MEDIA_TYPES: dict[str, Form] = {
     "text/csv": "csv",
 }
 
+SIDES = ("lower", "upper")
+"""Ends of a band."""
+
 
 @dataclass(frozen=True)
 class Frames:
@@ -47,7 +50,23 @@ class Frames:
     @property
     def channels(self) -> list[dict[str, str]]:
         """Name and SI unit of each column, in order."""
-        return [{"name": name, "unit": channel(name).unit} for name in self.columns]
+        return [{"name": name, "unit": channel(_bare(name)).unit} for name in self.columns]
+
+    def within(self, lower: "Frames", upper: "Frames") -> "Frames":
+        """These with the ends of each channel's band, `chassis.z.lower` and `chassis.z.upper`."""
+        ends = {
+            f"{name}.{side}": values
+            for side, frames in zip(SIDES, (lower, upper), strict=True)
+            for name, values in frames.columns.items()
+            if name != "time"
+        }
+        return Frames(self.columns | ends, self.decimation)
+
+
+def _bare(name: str) -> str:
+    """The channel whose values, or end of a band, a column has."""
+    channel_name, _, side = name.rpartition(".")
+    return channel_name if side in SIDES else name
 
 
 def take(

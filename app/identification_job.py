@@ -9,7 +9,7 @@ from typing import Any
 
 from ..engine.channels import Run
 from ..engine.parameters import ALL_NAMES, PARAMETER_NAMES, parameter
-from .errors import OverBudget
+from .errors import Conflict, OverBudget
 from .job_store import Job
 from .jobs import Kind, digest
 from .recordings import Recordings, as_stated, with_braking
@@ -126,6 +126,15 @@ def identify_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -
         seed=payload["seed"],
     )
     return fit_to_json(fit)
+
+
+def done(fitted: Job) -> Any:
+    """The fit of an identification as JSON; Conflict where it has none."""
+    if fitted.result is None:
+        raise Conflict(
+            f"The identification has no fit, its state is {fitted.state}; wait, or fit again."
+        )
+    return fitted.result
 
 
 def check_budget(measurements: list[Measurement], step: float, limits: Limits) -> None:

@@ -7,6 +7,8 @@ from fastapi.responses import JSONResponse
 
 from . import frames
 from .access import SessionId
+from .errors import InvalidRequest
+from .identification_job import KIND as IDENTIFICATION
 from .schemas import SimulationRequest
 from .services import Services, Shared
 from .strict_json import StrictRoute
@@ -38,14 +40,22 @@ def _simulated(
 ) -> Response:
     from .simulate import plan, reply
 
-    task = plan(body, sid, services.store, services.recordings, services.settings.limits)
+    asked = body.bands
+    fitted = None if asked is None else services.jobs.get(sid, asked.identification, IDENTIFICATION)
+    if asked is not None and form == "csv":
+        raise InvalidRequest("Bands come as JSON or frames; ask for one of them.", field="bands")
+    store, limits = services.store, services.settings.limits
+    task = plan(body, sid, fitted, store, services.recordings, limits)
     found = reply(body, task)
     if body.scene and services.viewers is not None:
         services.viewers.show(sid, task.vehicle)
     if form == "csv":
         return csv_reply(found.run)
-    taken = frames.take(found.run, body.channels, body.max_samples, body.decimate)
-    return frames_reply(found.head, taken, form)
+    taken, *ends = (
+        frames.take(run, body.channels, body.max_samples, body.decimate)
+        for run in (found.run, *((found.bands.lower, found.bands.upper) if found.bands else ()))
+    )
+    return frames_reply(found.head, taken.within(*ends) if ends else taken, form)
 
 
 def frames_reply(head: dict[str, Any], taken: frames.Frames, form: frames.Form) -> Response:

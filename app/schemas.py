@@ -128,6 +128,18 @@ class ExcitationForm(WireForm):
     sample_step: Annotated[Number, Field(ge=SHORTEST_STEP, le=LONGEST_SAMPLE_STEP)] | None = None
 
 
+class BandsForm(WireForm):
+    """95 % bands of a simulation by the errors of an identification that is done.
+
+    cars, seed : of the sampling
+    """
+
+    identification: Name
+    method: Literal["linear", "sampled"] = "linear"
+    cars: Annotated[Whole, Field(ge=16, le=256)] = 64
+    seed: Seed = 0
+
+
 class SimulationRequest(ExcitationForm):
     """One simulation of the session's car, or of another one."""
 
@@ -139,6 +151,7 @@ class SimulationRequest(ExcitationForm):
     decimate: Literal["extremes", "stride"] = "extremes"
     seq: Annotated[Whole, Field(ge=0, le=2**53)] = 0
     scene: Flag = False
+    bands: BandsForm | None = None
 
 
 class SpacedForm(WireForm):

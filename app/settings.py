@@ -36,6 +36,7 @@ class Limits:
     waiting_simulations: int = 64
     simulated_seconds: float = 600.0
     simulated_steps: int = 400_000
+    banded_steps: int = 2_000_000
     identified_samples: int = 400_000
     advised_seconds: float = 1000.0
     swept_cars: int = 100_000

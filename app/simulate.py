@@ -9,12 +9,17 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from ..engine.bands import Bands, bands
 from ..engine.channels import Run, channel
-from ..engine.metrics import metrics
+from ..engine.excitation import Excitation
+from ..engine.kept_fit import fit_from_json
+from ..engine.metrics import Metric, metrics
 from ..engine.vehicle import Vehicle
 from ..engine.vehicle_file import vehicle_from_json
 from .errors import OverBudget
 from .excitation import excitation_of, extent, mode_of, recording_in, recording_of
+from .identification_job import done
+from .job_store import Job
 from .recordings import Recordings
 from .schemas import SimulationRequest
 from .settings import Limits
@@ -27,6 +32,7 @@ class Task:
 
     vehicle: Vehicle
     run: Callable[[], Any]
+    bands: Callable[[], Bands] | None
 
 
 @dataclass(frozen=True)
@@ -35,30 +41,54 @@ class Reply:
 
     run: Run
     head: dict[str, Any]
+    bands: Bands | None
 
 
 def plan(
-    request: SimulationRequest, session: str, store: Store, recordings: Recordings, limits: Limits
+    request: SimulationRequest,
+    session: str,
+    fitted: Job | None,
+    store: Store,
+    recordings: Recordings,
+    limits: Limits,
 ) -> Task:
-    """The simulation asked for, checked against the work budget; reads what it needs."""
+    """The simulation asked for, checked against the work budget; reads what it needs.
+
+    fitted : the identification whose errors make the bands, if any are asked for
+    """
     mode_of(request)
     for name in request.channels or ():
         channel(name)
     vehicle = _vehicle(request, session, store)
     kept = recording_of(request, session, store)
-    _check_budget(*extent(request, kept, [vehicle]), limits)
+    duration, steps = extent(request, kept, [vehicle])
+    _check_budget(duration, steps, limits)
+
+    def driven() -> Excitation:
+        recording = None if kept is None else recording_in(request, kept, recordings)
+        return excitation_of(request, recording)
 
     def run() -> Any:
-        recording = None if kept is None else recording_in(request, kept, recordings)
-        return excitation_of(request, recording).simulate(vehicle, request.model)
+        return driven().simulate(vehicle, request.model)
 
-    return Task(vehicle, run)
+    if request.bands is None or fitted is None:
+        return Task(vehicle, run, None)
+    asked, fit = request.bands, fit_from_json(done(fitted))
+    cars = asked.cars if asked.method == "sampled" else 2 * len(fit.free)
+    if steps * (cars + 1) > limits.banded_steps:
+        raise OverBudget(
+            f"Bands by {cars} cars take {math.ceil(steps * (cars + 1))} steps, at most "
+            f"{limits.banded_steps} are taken; shorten it, or draw fewer cars."
+        )
+    how: dict[str, Any] = {"cars": asked.cars, "seed": asked.seed, "model": request.model}
+    return Task(vehicle, run, lambda: bands(fit, vehicle, driven(), method=asked.method, **how))
 
 
 def reply(request: SimulationRequest, task: Task) -> Reply:
     """Run the simulation and sum it up."""
     began = time.perf_counter()
     found = task.run()
+    within = None if task.bands is None else task.bands()
     head = {
         "seq": request.seq,
         "mode": found.mode,
@@ -66,11 +96,17 @@ def reply(request: SimulationRequest, task: Task) -> Reply:
         "steps": found.steps,
         "fit_percent": dict(found.fit_percent),
         "negative_load_share": dict(found.negative_load_share),
-        "metrics": [asdict(metric) for metric in metrics(found.run)],
-        "warnings": list(found.warnings),
+        "metrics": [_metric(metric, within) for metric in metrics(found.run)],
+        "warnings": [*found.warnings, *(within.warnings if within else ())],
         "seconds": time.perf_counter() - began,
     }
-    return Reply(found.run, head)
+    return Reply(found.run, head, within)
+
+
+def _metric(metric: Metric, within: Bands | None) -> dict[str, Any]:
+    """A figure, with its interval where there are bands; null for an end that is open."""
+    told = asdict(metric)
+    return told if within is None else {**told, "interval": list(within.figures[metric.name])}
 
 
 def _vehicle(request: SimulationRequest, session: str, store: Store) -> Vehicle:

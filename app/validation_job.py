@@ -9,8 +9,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from ..engine.vehicle_file import vehicle_from_json
-from .errors import Conflict, InvalidRequest
-from .identification_job import check_budget
+from .errors import InvalidRequest
+from .identification_job import check_budget, done
 from .job_store import Job
 from .jobs import Kind
 from .recordings import Recordings, as_stated, stated, with_braking
@@ -45,10 +45,7 @@ def check_and_fill(
     """Everything that the job needs, checked."""
     from ..engine.validation import check_cases, geometry_from_json
 
-    if fitted.result is None:
-        raise Conflict(
-            f"The identification has no fit, its state is {fitted.state}; wait, or fit again."
-        )
+    fit = done(fitted)
     held = [store.measurement(session, one) for one in request.hold_out]
     runs = [{**one, "role": "fit"} for one in fitted.spec["runs"]]
     runs += [{**stated(one), "role": "hold-out"} for one in held]
@@ -62,7 +59,7 @@ def check_and_fill(
     kept = [store.measurement(session, one["id"]) for one in runs]
     spec = {
         "identification": fitted.id,
-        "fit": fitted.result,
+        "fit": fit,
         "runs": runs,
         "braking": {**fitted.spec["braking"], **request.model_dump(mode="json")["braking"]},
         "manoeuvres": _driven(request, kept),
@@ -70,7 +67,7 @@ def check_and_fill(
     }
     if request.geometry is not None:
         geometry_from_json(request.geometry)
-    check_budget(kept, fitted.result["settings"]["step"], limits)
+    check_budget(kept, fit["settings"]["step"], limits)
     check_cases(_cases(spec, _runs(spec, session, store, recordings)))
     return {**spec, "recorded": [{"name": one.name, "sha256": one.sha256} for one in kept]}
 
