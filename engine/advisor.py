@@ -34,7 +34,7 @@ from .channels import OUTPUT_CHANNELS
 from .condensed import triangle
 from .errors import ProblemError
 from .expected_noise import INPUT_NOISE, ExpectedNoise, noise_of_runs, stated_noise
-from .filters import smoothed
+from .filters import Band, in_band
 from .fit import determined
 from .identification import AT_BOUND
 from .integration import cores
@@ -152,7 +152,7 @@ def advise(
             "The car does not come through the runs at these values; fit it to the runs first."
         )
     runs = residuals.of_runs(r, residuals.jacobian(x))
-    known = information(runs)
+    known = sum(residuals.of_priors(), start=information(runs))
     noise = noise_of_runs(problem, runs, known.root)
     return _advised(problem, known, noise, candidates or catalogue(), planned, began)
 
@@ -258,7 +258,7 @@ def _added(
         moved = rims_batch(cars, inputs, problem.traction)
         if not np.all(np.isfinite(moved)):
             return "The car does not come through it on its recorded rims."
-        jacobian = _jacobian(moved, steps, inputs.time, noise, problem.settings.output_cutoff_hz)
+        jacobian = _jacobian(moved, steps, inputs.time, noise, problem.settings.output_band)
         return noise.information(triangle(jacobian.reshape(-1, len(x))), jacobian)
 
     with ThreadPoolExecutor(cores()) as pool:
@@ -267,12 +267,10 @@ def _added(
     return added, {key: one for key, one in found.items() if isinstance(one, str)}
 
 
-def _jacobian(
-    moved: Array, steps: Array, time: Array, noise: ExpectedNoise, cutoff: float | None
-) -> Array:
+def _jacobian(moved: Array, steps: Array, time: Array, noise: ExpectedNoise, band: Band) -> Array:
     """d(channel/noise)/dx, (channels, samples, n), from z, pitch and roll (1 + n, samples, 3)."""
     slopes = (moved[1:] - moved[0]) / steps[:, np.newaxis, np.newaxis]
-    by_sample = smoothed(time, slopes.transpose(1, 2, 0).reshape(len(time), -1), cutoff)
+    by_sample = in_band(time, slopes.transpose(1, 2, 0).reshape(len(time), -1), band)
     by_channel = by_sample.reshape(len(time), 3, -1).transpose(1, 0, 2)
     return np.stack(
         [by_channel[OUTPUT_CHANNELS.index(name)] / noise.noise[name] for name in noise.channels]

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from .car_rows import car_row
 from .channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
-from .filters import smoothed
+from .filters import in_band
 from .problem import Problem
 from .rims import prepare
 from .rims_settings import RimsSettings
@@ -194,7 +194,7 @@ def _answer(
     quiet = replace(noisy, channels={**channels, **still})
     car, at_rest = car_row(vehicle)[np.newaxis], replace(settings, initial_state="equilibrium")
     found = [rims_batch(car, prepare(run, vehicle, at_rest), "exact")[0] for run in (noisy, quiet)]
-    return smoothed(time, found[0] - found[1], settings.output_cutoff_hz)
+    return in_band(time, found[0] - found[1], settings.output_band)
 
 
 def _frequencies(length: int, step: float) -> Array:

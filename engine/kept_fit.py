@@ -1,7 +1,7 @@
 """A fit read back from its JSON: the car, what was free, and how well it is known."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from .braking import Interval
 from .errors import ProblemError, RideError
 from .json_text import read_json
+from .loss import Loss
 from .parameters import parameter
 from .problem import FreeParameter
 from .rims_settings import RimsSettings
@@ -30,6 +31,7 @@ class KeptFit:
     free : what was free, with the search's variables
     errors : of these variables
     braking : where the car was taken to brake, by the runs' names, s
+    priors : (mean, standard deviation) by parameter, SI
     """
 
     vehicle: Vehicle
@@ -38,6 +40,8 @@ class KeptFit:
     traction: Traction
     settings: RimsSettings
     braking: Mapping[str, tuple[Interval, ...]]
+    loss: Loss = Loss()
+    priors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def x(self) -> Array:
@@ -86,6 +90,8 @@ def fit_from_json(data: Any, source: str = "fit") -> KeptFit:
                 run["name"]: tuple((float(begin), float(end)) for begin, end in run["braking"])
                 for run in data["runs"]
             },
+            Loss(data["loss"], float(data["loss_scale"])),
+            {one["name"]: (float(one["mean"]), float(one["deviation"])) for one in data["priors"]},
         )
         finite = np.all(np.isfinite(errors.covariance)) and np.all(np.isfinite(kept.x))
     except (KeyError, TypeError, ValueError, IndexError, RideError) as error:

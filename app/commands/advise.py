@@ -73,6 +73,8 @@ def _problem(options: Namespace, noise: Mapping[str, float]) -> Problem:
         bounds={one.name: (one.lower, one.upper) for one in fit.free},
         traction=fit.traction,
         settings=fit.settings,
+        loss=fit.loss,
+        priors=fit.priors,
     )
 
 
