@@ -164,3 +164,22 @@ def test_linearised_and_sampled_bands_of_a_bump_agree_for_small_errors(fit):
     for name in ("chassis.z", "chassis.pitch", "tyre.rl.load"):
         ratio = np.mean(half_width(sampled, name)) / np.mean(half_width(linear, name))
         assert ratio == pytest.approx(1.0, abs=0.35), name
+
+
+def test_bands_hold_the_true_curve_of_an_unseen_bump_as_often_as_they_say():
+    """Oracle: the true car's curves, over ten fits of three parameters to runs with fresh noise.
+    95 % of samples; with one or two independent directions a fit, the mean over ten scatters by
+    sqrt(0.95 0.05 / 15) = 6 %: not below 95 - 2.5 x 6."""
+    true = BUMP.simulate(CAR).run
+    held = []
+    for seed in range(10):
+        run = drive_table_2(CAR, noise=DEFAULT_NOISE, seed=seed)[:1]
+        free = ["K_F", "C_R", "phi_R"]
+        kept = fit_from_json(fit_to_json(identify(Problem.build(CAR, run, free=free))))
+        found = bands(kept, kept.vehicle, BUMP)
+        for name in ("chassis.z", "chassis.pitch"):
+            width = half_width(found, name)
+            moving = width > 0.05 * width.max()
+            inside = (found.lower[name] <= true[name]) & (true[name] <= found.upper[name])
+            held.append(np.mean(inside[moving]))
+    assert np.mean(held) > 0.80
