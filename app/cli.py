@@ -281,6 +281,7 @@ def _describe_advise(command: Parser) -> None:
     command.add_argument(
         "--planned", metavar="NAME", **several, help="manoeuvres that will be driven in any case"
     )
+    _add_mapping(command)
     _add_noise(command, "noise of the recordings and, without any, of the sensors")
     command.add_argument("--json", metavar="FILE", help="the advice as JSON")
 

@@ -18,13 +18,20 @@ from ...engine.kept_fit import fit_from_json, is_fit
 from ...engine.manoeuvre import Manoeuvre
 from ...engine.parameters import parameter
 from ...engine.problem import Problem
-from .inputs import find_manoeuvre, find_vehicle, read_noise, read_runs, recording_files
+from .inputs import (
+    find_manoeuvre,
+    find_mapping,
+    find_vehicle,
+    read_noise,
+    read_runs,
+    recording_files,
+)
 from .output import print_table, require_place, significant, write_file
 
 
 def advise(options: Namespace) -> None:
     """Rank the candidates, print the report, write the advice."""
-    inputs = (options.vehicle, options.noise, *recording_files(options.runs))
+    inputs = (options.vehicle, options.noise, options.mapping, *recording_files(options.runs))
     require_place(options.json, (*inputs, *options.candidates, *options.planned))
     candidates = _candidates(options)
     planned = tuple(map(_key, options.planned))
@@ -54,7 +61,7 @@ def _key(name: str) -> str:
 
 def _problem(options: Namespace, noise: Mapping[str, float]) -> Problem:
     """The problem of the runs at fitted values: those of a fit's file, else fitted now."""
-    runs = read_runs(options.runs, (), noise=noise)
+    runs = read_runs(options.runs, (), find_mapping(options.mapping), noise=noise)
     data = read_json(Path(options.vehicle), VehicleError) if _is_json(options.vehicle) else None
     if not is_fit(data):
         problem = Problem.build(find_vehicle(options.vehicle), runs)
