@@ -315,6 +315,21 @@ def _add_identification(command: Parser) -> None:
         **several,
         help="known from a drawing, SI units; or ~PERCENT%%",
     )
+    command.add_argument(
+        "--sensor",
+        metavar="CHANNEL.QUANTITY=VALUE",
+        **several,
+        help="what a sensor is known to do: delay, gain, bias, sign or noise, SI units",
+    )
+    command.add_argument(
+        "--fit-sensor",
+        metavar="CHANNEL.QUANTITY",
+        **several,
+        help="identify it too: delay, gain, bias or noise",
+    )
+    command.add_argument(
+        "--fit-noise", action="store_true", help="identify the noise of all compared channels"
+    )
     _add_rims_mode(command, "--braking lap_2.csv=6.2:9.8")
     _add_step(command, "5 ms unless told")
     _add_noise(command, "noise of the recordings")

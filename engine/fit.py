@@ -21,6 +21,9 @@ DETERMINED_BELOW = 0.15
 WEAKLY_BELOW = 0.50
 """Half-width of the 95 % interval over |value| up to which a parameter is determined, or weakly."""
 
+DELAY_MATTERS = 0.005
+"""What stands for |value| where it is a delay's, s: one sample at the usual rate."""
+
 
 class Outcome(StrEnum):
     """How a fit ended; the value is the sentence the engineer reads."""
@@ -89,9 +92,57 @@ class ParameterEstimate:
     determined: str
 
     @property
+    def title(self) -> str:
+        """What sentences call it."""
+        return self.name
+
+    @property
     def free(self) -> FreeParameter:
         """What was free, with the search's variable."""
         return FreeParameter(self.name, self.start, self.lower, self.upper)
+
+
+@dataclass(frozen=True, slots=True)
+class SensorEstimate:
+    """A quantity of a sensor that was found with the parameters, SI; fields as of
+    `ParameterEstimate`.
+
+    run : whose own it is, or None where the runs share it
+    determined : by the half-width over the value of a gain, over the channel's standard deviation
+        in the run for a bias, and over DELAY_MATTERS for a delay
+    """
+
+    name: str
+    channel: str
+    quantity: str
+    run: str | None
+    value: float
+    unit: str
+    std_error: float
+    confidence_interval: tuple[float, float]
+    start: float
+    lower: float
+    upper: float
+    at_bound: bool
+    determined: str
+
+    @property
+    def title(self) -> str:
+        """What sentences call it."""
+        return self.name if self.run is None else f"{self.name} of run {self.run}"
+
+
+@dataclass(frozen=True, slots=True)
+class Offer:
+    """What of a sensor would mend a channel that is probably wrong.
+
+    sensor : quantities to fix, as an identification takes them
+    """
+
+    run: str
+    channel: str
+    sensor: Mapping[str, float]
+    sentence: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +230,8 @@ class Whiteness:
 class FittedRun:
     """What was compared in one run, SI.
 
-    noise : assumed, by channel
+    noise : in force, by channel
+    noise_source : by channel, where that is from: "stated", "default" or "fitted"
     discounted : samples beyond the scale of the loss, by channel; none where it is linear
     braking : (begin, end) where the car was taken to brake, s
     conditioning : what made its channels of those that were recorded
@@ -188,6 +240,7 @@ class FittedRun:
     name: str
     samples: int
     noise: Mapping[str, float]
+    noise_source: Mapping[str, str]
     discounted: Mapping[str, int]
     braking: tuple[Interval, ...]
     conditioning: tuple[StepRecord, ...] = ()
@@ -238,16 +291,22 @@ class Fit:
     vehicle : with the identified values
     cost : half the sum of squared residuals as the loss counts them, in units of the noise, priors
         among them
-    errors : of the search's variables, those of `FreeParameter`, in the parameters' order
+    sensors : what was found of the sensors with the parameters
+    fixed_sensors : what was known of them, by channel and quantity
+    errors : of the search's variables, those of `FreeParameter`, in the parameters' order, whatever
+        the sensors are
     fit_percent : by run and channel
-    residuals : by run and channel, (samples,) model minus measured, SI
-    cost_history : the best cost after each evaluation
+    residuals : by run and channel, (samples,) model, as the sensors read it, minus measured, SI
+    offers : what would mend channels that are probably wrong
+    cost_history : the best cost after each evaluation, as the noise then in force counts it
     starts : points that were tried as starts, the told one among them
     minima : what the searches from the best of them ended in, the fit's own first
     """
 
     vehicle: Vehicle
     parameters: tuple[ParameterEstimate, ...]
+    sensors: tuple[SensorEstimate, ...]
+    fixed_sensors: Mapping[str, Mapping[str, float]]
     cost: float
     errors: Uncertainty
     fit_percent: Mapping[str, Mapping[str, float]]
@@ -255,6 +314,7 @@ class Fit:
     outcome: Outcome
     converged: bool
     warnings: tuple[str, ...]
+    offers: tuple[Offer, ...]
     seconds: float
     simulations: int
     evaluations: int
@@ -268,6 +328,16 @@ class Fit:
     priors: tuple[PriorCheck, ...]
     whiteness: tuple[Whiteness, ...]
     verdict: Verdict
+
+    @property
+    def found_noise(self) -> dict[tuple[str, str], float]:
+        """The noise that was fitted, by run and channel, SI."""
+        return {
+            (run.name, channel): run.noise[channel]
+            for run in self.runs
+            for channel, source in run.noise_source.items()
+            if source == "fitted"
+        }
 
 
 def determined(value: float, half_width: float, at_bound: bool = False) -> str:

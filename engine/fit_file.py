@@ -10,7 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from .fit import Fit, ParameterEstimate
+from .fit import Fit, ParameterEstimate, SensorEstimate
 from .profile import Profile
 from .step_record import step_record_to_json
 from .vehicle_file import vehicle_to_json
@@ -22,6 +22,8 @@ def fit_to_json(fit: Fit) -> dict[str, Any]:
         {
             "vehicle": vehicle_to_json(fit.vehicle),
             "parameters": [_parameter(one) for one in fit.parameters],
+            "sensors": [_parameter(one) for one in fit.sensors],
+            "fixed_sensors": {name: dict(one) for name, one in fit.fixed_sensors.items()},
             "verdict": asdict(fit.verdict),
             "correlation": fit.errors.correlation.tolist(),
             "covariance": fit.errors.covariance.tolist(),
@@ -30,6 +32,7 @@ def fit_to_json(fit: Fit) -> dict[str, Any]:
             "outcome": str(fit.outcome),
             "converged": fit.converged,
             "warnings": list(fit.warnings),
+            "offers": [asdict(one) for one in fit.offers],
             "cost": fit.cost,
             "cost_history": list(fit.cost_history),
             "fit_percent": {run: dict(channels) for run, channels in fit.fit_percent.items()},
@@ -38,6 +41,7 @@ def fit_to_json(fit: Fit) -> dict[str, Any]:
                     "name": run.name,
                     "samples": run.samples,
                     "noise": dict(run.noise),
+                    "noise_source": dict(run.noise_source),
                     "discounted": dict(run.discounted),
                     "braking": [list(interval) for interval in run.braking],
                     "conditioning": [step_record_to_json(one) for one in run.conditioning],
@@ -70,7 +74,7 @@ def write_fit(fit: Fit, path: Path | str) -> None:
     Path(path).write_text(text + "\n", encoding="utf-8")
 
 
-def _parameter(one: ParameterEstimate) -> dict[str, Any]:
+def _parameter(one: ParameterEstimate | SensorEstimate) -> dict[str, Any]:
     row = asdict(one)
     row["confidence_interval"] = list(one.confidence_interval)
     return row

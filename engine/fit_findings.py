@@ -1,16 +1,18 @@
 """What a fit should tell about its runs: wrong signs and units, channels the model cannot follow.
 
-All functions compare one measured channel with the model and return a sentence that names run and
-channel, or None. The model at the start values is as telling as the fitted one: a fit to a record
-of the wrong sign bends the car until the two look alike.
+All functions compare one measured channel with what its sensor reads of the model and return a
+sentence that names run and channel, or None. The model at the start values is as telling as the
+fitted one: a fit to a record of the wrong sign bends the car until the two look alike.
 """
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .fit import FittedRun, Minimum, ParameterEstimate
+from .fit import FittedRun, Minimum, ParameterEstimate, SensorEstimate
 from .problem import ComparedRun, Problem
 from .simulation import fit_percent
 from .spikes import despiked
@@ -45,10 +47,12 @@ POOR_FIT = 50.0
 NOISE_EXPLAINS = 2.0
 """Residuals up to this many times the stated noise are noise."""
 
+DEGREES = 180.0 / math.pi
+
 UNIT_RATIOS = {
     "chassis.z": ((1e3, 3.0, "mm", "m"), (1e-3, 3.0, "m", "mm")),
-    "chassis.pitch": ((57.3, 2.5, "deg", "rad"), (1 / 57.3, 2.5, "rad", "deg")),
-    "chassis.roll": ((57.3, 2.5, "deg", "rad"), (1 / 57.3, 2.5, "rad", "deg")),
+    "chassis.pitch": ((DEGREES, 2.5, "deg", "rad"), (1 / DEGREES, 2.5, "rad", "deg")),
+    "chassis.roll": ((DEGREES, 2.5, "deg", "rad"), (1 / DEGREES, 2.5, "rad", "deg")),
 }
 """By channel: the ratio of measured to model amplitude that a mistaken unit makes, the factor
 around it that counts, the unit of the numbers and the unit the header claims."""
@@ -69,6 +73,27 @@ TOLD_APART = 0.9
 """Correlation from which an undetermined parameter is said to be confused with another."""
 
 
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """What is probably wrong with a channel; `factor` of its readings, where that would mend it."""
+
+    sentence: str
+    factor: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelFaults:
+    """All that is probably wrong with a run's channel; `beside` tells what else it may be."""
+
+    found: tuple[Fault, ...]
+    beside: list[str] = field(default_factory=list)
+
+    @property
+    def sentences(self) -> list[str]:
+        """Them all, for a person."""
+        return [*(one.sentence for one in self.found), *self.beside]
+
+
 def correlation(measured: Array, model: Array) -> float:
     """Correlation of the two histories about their means; 0 when one of them never moves."""
     one, other = measured - np.mean(measured), model - np.mean(model)
@@ -83,7 +108,9 @@ def _amplitude_ratio(channel: str, measured: Array, model: Array) -> float:
     return of_measured / of_model if moves else 0.0
 
 
-def wrong_sign(run: str, channel: str, measured: Array, start: Array, fitted: Array) -> str | None:
+def wrong_sign(
+    run: str, channel: str, measured: Array, start: Array, fitted: Array
+) -> Fault | None:
     """A channel that runs against the model, at the start values or after the fit.
 
     A model that moves much more or less than the channel is no witness.
@@ -91,30 +118,34 @@ def wrong_sign(run: str, channel: str, measured: Array, start: Array, fitted: Ar
     for model, when in ((start, "at the start values"), (fitted, "after the fit")):
         opposed = correlation(measured, model)
         if opposed < OPPOSITE and 1.0 / ALIKE < _amplitude_ratio(channel, measured, model) < ALIKE:
-            return (
+            return Fault(
                 f"{channel} of run {run} runs against the model (correlation {opposed:.2f} {when});"
-                f" its sign is probably wrong: multiply it by -1{EXCHANGED.get(channel, '')}."
+                f" its sign is probably wrong: multiply it by -1{EXCHANGED.get(channel, '')}.",
+                -1.0,
             )
     return None
 
 
-def wrong_unit(run: str, channel: str, measured: Array, start: Array) -> str | None:
+def wrong_unit(run: str, channel: str, measured: Array, start: Array) -> Fault | None:
     """A channel whose amplitude is a unit's factor away from the model's at the start values."""
     ratio = _amplitude_ratio(channel, measured, start)
     for expected, spread, numbers, header in UNIT_RATIOS[channel]:
         if expected / spread < ratio < expected * spread:
-            return (
+            return Fault(
                 f"{channel} of run {run} moves {ratio:.3g} times as much as the model; its numbers "
-                f"may be in {numbers} under a header that says {header}: correct the header."
+                f"may be in {numbers} under a header that says {header}: correct the header.",
+                expected,
             )
     return None
 
 
-def dead_sensor(run: str, channel: str, measured: Array, model: Array, noise: float) -> str | None:
+def dead_sensor(
+    run: str, channel: str, measured: Array, model: Array, noise: float
+) -> Fault | None:
     """A channel that never moves although the model at the start values does, beyond its noise."""
     if np.ptp(measured) > 0.0 or float(np.std(model)) <= NOISE_EXPLAINS * noise:
         return None
-    return (
+    return Fault(
         f"{channel} of run {run} never moves while the model does; its sensor was probably dead: "
         "leave the channel out."
     )
@@ -134,9 +165,9 @@ def poor_fit(run: str, channel: str, measured: Array, fitted: Array, noise: floa
 
 def channel_faults(
     runs: Sequence[ComparedRun], start: Histories, fitted: Histories
-) -> dict[tuple[str, str], list[str]]:
-    """By run and channel, sentences on a sign, unit or sensor that is probably wrong."""
-    found: dict[tuple[str, str], list[str]] = {}
+) -> dict[tuple[str, str], ChannelFaults]:
+    """By run and channel, a sign, unit or sensor that is probably wrong."""
+    found: dict[tuple[str, str], ChannelFaults] = {}
     for seen in runs:
         opposed = []
         for channel, measured in seen.measured.items():
@@ -146,9 +177,10 @@ def channel_faults(
             opposed += [channel] if sign else []
             dead = dead_sensor(seen.name, channel, measured, before, seen.noise[channel])
             if sign or unit or dead:
-                found[seen.name, channel] = [one for one in (sign, unit, dead) if one]
+                faults = tuple(one for one in (sign, unit, dead) if one)
+                found[seen.name, channel] = ChannelFaults(faults)
         if len(opposed) > 1:
-            found[seen.name, opposed[-1]].append(
+            found[seen.name, opposed[-1]].beside.append(
                 f"Since {' and '.join(opposed)} of run {seen.name} run against the model together, "
                 "it may rather be the wheel.*.z whose sign is wrong."
             )
@@ -226,22 +258,27 @@ def _ratio(one: Minimum, other: Minimum, name: str) -> float:
     return abs(first - second) / max(abs(first), abs(second), 1e-9)
 
 
-def bound_findings(estimates: Sequence[ParameterEstimate]) -> list[str]:
-    """Parameters at a bound."""
+def bound_findings(estimates: Sequence[ParameterEstimate | SensorEstimate]) -> list[str]:
+    """What is at a bound."""
     return [_at_bound(one) for one in estimates if one.at_bound]
 
 
-def undetermined_findings(estimates: Sequence[ParameterEstimate], errors: Uncertainty) -> list[str]:
-    """Parameters which the runs do not determine, grouped by what can be done about it."""
-    unexcited, confused, unknown = [], [], []
+def undetermined_findings(
+    estimates: Sequence[ParameterEstimate | SensorEstimate], errors: Uncertainty
+) -> list[str]:
+    """What the runs do not determine, grouped by what can be done about it.
+
+    errors : of all estimates, in their order
+    """
+    unexcited, confused, unknown, sensors = [], [], [], []
     for k, one in enumerate(estimates):
         if one.at_bound or one.determined != "no":
             continue
         partner = _partner(errors, k)
         if not _excited(errors, k):
-            unexcited.append(one.name)
+            unexcited.append(one.title)
         elif partner is None:
-            unknown.append(one.name)
+            (sensors if isinstance(one, SensorEstimate) else unknown).append(one.title)
         elif sorted([k, partner]) not in confused:
             confused.append(sorted([k, partner]))
     found = []
@@ -252,21 +289,28 @@ def undetermined_findings(estimates: Sequence[ParameterEstimate], errors: Uncert
         )
     for first, second in confused:
         found.append(
-            f"The runs hardly tell {estimates[first].name} from {estimates[second].name}; fix one "
-            "of them or add a run that moves them differently."
+            f"The runs hardly tell {estimates[first].title} from {estimates[second].title}; fix "
+            "one of them or add a run that moves them differently."
         )
     if unknown:
         found.append(
             f"The runs leave {', '.join(unknown)} with a 95 % interval wider than half the value; "
             "fix some of the parameters or measure more."
         )
+    if sensors:
+        found.append(
+            f"The runs leave {', '.join(sensors)} open; fix what is known of the sensors or measure"
+            " more."
+        )
     return found
 
 
-def _at_bound(one: ParameterEstimate) -> str:
+def _at_bound(one: ParameterEstimate | SensorEstimate) -> str:
     at_lower = one.value - one.lower < one.upper - one.value
     side, bound = ("lower", one.lower) if at_lower else ("upper", one.upper)
-    said = f"{one.name} is at its {side} bound, {bound:.4g}{after_number(one.unit)}"
+    said = f"{one.title} is at its {side} bound, {bound:.4g}{after_number(one.unit)}"
+    if isinstance(one, SensorEstimate):
+        return f"{said}; check the sensor, or the car's known data."
     if one.name.endswith("knee_speed") and not at_lower:
         return (
             f"{said}: the runs show no knee, as"

@@ -2,7 +2,9 @@
 
 Least squares on (model - measured) / noise over every compared channel of every run, by the
 trust-region reflective method of scipy (`least_squares`, trf) on scaled parameters between bounds;
-`residuals` has the scaling and the derivatives, `uncertainty` the errors. docs/identification.md
+`residuals` has the scaling and the derivatives, `uncertainty` the errors. What is asked of the
+sensors is found with the parameters; `errors`, the verdict and all that follows from them are of
+the car's parameters, whatever the sensors are (`Uncertainty.marginal`). docs/identification.md
 tells what the paper's campaign can and cannot determine.
 """
 
@@ -26,6 +28,7 @@ from .fit import (
     Outcome,
     ParameterEstimate,
     Progress,
+    SensorEstimate,
     determined,
 )
 from .fit_findings import (
@@ -40,14 +43,16 @@ from .fit_findings import (
 )
 from .initial_state import swings_in
 from .multistart import refined_starts, spread
-from .parameters import parameter
 from .prior_checks import disagreements, prior_checks
-from .problem import ComparedRun, FreeParameter, Problem
+from .problem import SENSORS_BEST, ComparedRun, FreeParameter, Problem
 from .residuals import FAILED_TRIAL, Residuals, Simulate
+from .run_notes import DEFAULT_NOISE
 from .search import Found, Search
 from .search_settings import MOST_STARTS
+from .sensor_findings import estimated, offers
 from .simulation import rims_batch
 from .uncertainty import Uncertainty, information, uncertainty
+from .variables import Variable
 from .verdict import verdict, without_verdict
 from .whiteness import whiteness, whiteness_findings
 
@@ -73,6 +78,15 @@ between the bounds."""
 
 MUCH_BETTER = 0.5
 """Such a car is taken when its cost is below this share of the start's."""
+
+NOISE_ROUNDS = 2
+"""Fits at most with noise from the residuals of the fit before, unless ..."""
+
+SAME_NOISE = 0.01
+"""... none of it changes by more than this share."""
+
+MEDIAN_OF_NORMAL = 0.6745
+"""Median of |e| over the standard deviation of a normal e."""
 
 
 def identify(
@@ -103,7 +117,7 @@ def identify(
     # A start on a bound leaves the trust region no room and the search ends where it began.
     room = OFF_BOUNDS * (residuals.upper - residuals.lower)
     x_start = np.clip(
-        [one.variable(one.start) for one in problem.free],
+        [one.variable(one.start) for one in problem.variables],
         residuals.lower + room,
         residuals.upper - room,
     )
@@ -111,11 +125,18 @@ def identify(
     start = residuals.model(x_start)
 
     search = Search(residuals, progress)
-    if _in_doubt(residuals, x_start):  # where other starts would mean nothing either
+    doubted = _in_doubt(residuals, x_start)
+    if doubted:  # where other starts would mean nothing either
         most_evaluations, starts = min(most_evaluations, EVALUATIONS_ON_A_FAULT), 1
-    others = spread(residuals.lower + room, residuals.upper - room, starts - 1, seed)
+    lower, upper = residuals.lower + room, residuals.upper - room
+    others = spread(problem.of_car(lower), problem.of_car(upper), starts - 1, seed)
+    of_sensors = x_start[len(problem.free) :]
+    others = [np.concatenate([of_car, of_sensors]) for of_car in others]
     reached = refined_starts(search, x_start, others, most_evaluations)
-    solution = reached[0][0]
+    if not doubted:
+        reached = _with_found_noise(search, reached, most_evaluations)
+    told, residuals = problem.runs, search.residuals
+    problem, solution = residuals.problem, reached[0][0]
     r = solution.residuals
     left = residuals.of_runs(r, solution.slopes)
     said = information(left)
@@ -124,43 +145,47 @@ def identify(
         for seen, run in zip(problem.runs, left, strict=True)
         for test in whiteness(seen.name, list(seen.measured), run, problem.settings)
     )
-    errors = uncertainty(sum(residuals.of_priors(), start=said))
+    of_all = uncertainty(sum(residuals.of_priors(), start=said))
+    errors = of_all.marginal(len(problem.free))
     priors = prior_checks(residuals, solution, said)
-    estimates = _estimates(problem, solution.x, errors, beyond=solution.beyond())
+    estimates, sensors = _estimates(problem, solution.x, of_all, beyond=solution.beyond())
     fitted = residuals.model(solution.x)
     driven = _well_driven(problem)
     faults = channel_faults(driven, start, fitted)
     wrong = bool(faults) or len(driven) < len(problem.runs)
-    outcome = Outcome.DOUBTFUL if wrong else _outcome(solution, estimates, residuals)
+    outcome = Outcome.DOUBTFUL if wrong else _outcome(solution, estimates, sensors, residuals)
     converged = outcome in CONVERGED
     runs = tuple(_fitted_run(seen, residuals, r) for seen in problem.runs)
     minima = tuple(_minimum(ended, residuals) for ended in reached)
     if not converged:
         estimates = tuple(replace(one, determined="no") for one in estimates)
+        sensors = tuple(replace(one, determined="no") for one in sensors)
     warnings = [
         *(warning for seen in problem.runs for warning in seen.inputs.warnings),
         *moved,
-        *(sentence for sentences in faults.values() for sentence in sentences),
+        *(sentence for one in faults.values() for sentence in one.sentences),
     ]
     if not wrong:  # what else a wrong channel has bent is no news
         warnings += [
-            *poor_fits(problem.runs, fitted),
+            *poor_fits(told, fitted),  # noise out of residuals explains any misfit
             *_swings(problem, fitted),
-            *hardly_moving(problem.runs),
+            *hardly_moving(told),
             *minima_findings(minima),
             *outlier_findings(problem, runs),
             *disagreements(priors, problem.free),
             *whiteness_findings(tests),
-            *bound_findings(estimates),
+            *bound_findings([*estimates, *sensors]),
         ]
     if converged:
-        warnings += undetermined_findings(estimates, errors)
+        warnings += undetermined_findings([*estimates, *sensors], of_all)
     return Fit(
-        verdict=verdict(estimates, errors, solution.x, problem.vehicle_at)
+        verdict=verdict(estimates, errors, problem.of_car(solution.x), problem.vehicle_at)
         if converged
         else without_verdict(estimates),
         vehicle=problem.vehicle_at(solution.x),
         parameters=estimates,
+        sensors=sensors,
+        fixed_sensors=problem.sensors.fixed,
         cost=float(solution.cost),
         errors=errors,
         fit_percent=residuals.percents(r),
@@ -168,8 +193,9 @@ def identify(
         outcome=outcome,
         converged=converged,
         warnings=tuple(dict.fromkeys(warnings)),
+        offers=offers(problem, driven, faults),
         seconds=time.perf_counter() - began,
-        simulations=residuals.simulations,
+        simulations=search.simulations,
         evaluations=search.evaluations,
         cost_history=tuple(search.cost_history),
         traction=problem.traction,
@@ -199,14 +225,16 @@ def _usable_start(residuals: Residuals, x: Array) -> tuple[Array, list[str]]:
         return x, []
     if not failed and _in_doubt(residuals, x):
         return x, []
-    reach = np.where([one.logarithmic for one in residuals.problem.free], 1.0, 2.0)
+    reach = np.where([one.logarithmic for one in residuals.problem.variables], 1.0, 2.0)
     # The sequence begins at the lower bounds.
     spread = Halton(len(x), scramble=False).fast_forward(1).random(SCATTERED_STARTS)
     near = np.maximum(residuals.lower, x - reach), np.minimum(residuals.upper, x + reach)
-    for where, (lower, upper) in (
+    of_sensors = np.arange(len(x)) >= len(residuals.problem.free)
+    for where, ends in (
         ("near them", near),
         ("between the bounds", (residuals.lower, residuals.upper)),
     ):
+        lower, upper = (np.where(of_sensors, x, end) for end in ends)
         trials = [lower + (upper - lower) * share for share in spread]
         costs = residuals.costs(trials)
         best = int(np.argmin(costs))
@@ -218,6 +246,48 @@ def _usable_start(residuals: Residuals, x: Array) -> tuple[Array, list[str]]:
         if not failed:
             return x, []
     raise ProblemError(_failure(residuals.problem))
+
+
+def _with_found_noise(
+    search: Search, reached: list[list[Found]], most_evaluations: int
+) -> list[list[Found]]:
+    """The minima, refined with the noise that is to be found from their lowest's residuals."""
+    for _ in range(NOISE_ROUNDS):
+        noise = _found_noise(search.residuals, reached[0][0].residuals)
+        known = {seen.name: seen.noise for seen in search.residuals.problem.runs}
+        if all(
+            abs(one - known[run][channel]) <= SAME_NOISE * one
+            for (run, channel), one in noise.items()
+        ):
+            break
+        search.weigh(search.residuals.of(search.residuals.problem.with_noise(noise)))
+        reached = [
+            [replace(search.refine(of[0].x, most_evaluations), told=of[0].told), *of[1:]]
+            for of in reached
+        ]
+        reached.sort(key=lambda of: of[0].cost)
+    return reached
+
+
+def _found_noise(residuals: Residuals, r: Array) -> dict[tuple[str, str], float]:
+    """By run and channel, standard deviation of the residuals where the noise is to be found; by
+    their median where a loss expects outliers.
+    """
+    problem, found = residuals.problem, {}
+    if np.any(r == FAILED_TRIAL):
+        return {}
+    for block in residuals.blocks():
+        if problem.sensors.fits_noise(block.channel):
+            left = np.abs(r[block.place])
+            size = (
+                float(np.sqrt(np.mean(left**2)))
+                if problem.loss.name == "linear"
+                else float(np.median(left)) / MEDIAN_OF_NORMAL
+            )
+            gain = abs(problem.sensors.reading(block.channel).gain)
+            least = SENSORS_BEST * DEFAULT_NOISE[block.channel] * gain
+            found[block.run, block.channel] = max(size * block.noise, least)
+    return found
 
 
 def _swings(problem: Problem, fitted: Histories) -> list[str]:
@@ -261,13 +331,15 @@ def _failure(problem: Problem) -> str:
 
 def _estimates(
     problem: Problem, x: Array, errors: Uncertainty, *, beyond: Array
-) -> tuple[ParameterEstimate, ...]:
-    """The parameters; at a bound nobody has looked further, so the interval is open there and, on
-    this side, reaches to where it would around the point that lies beyond.
+) -> tuple[tuple[ParameterEstimate, ...], tuple[SensorEstimate, ...]]:
+    """Parameters and sensors; at a bound nobody has looked further, so the interval is open there
+    and, on this side, reaches to where it would around the point that lies beyond.
+
+    errors : of all variables
     """
-    found = []
-    for one, variable, further, deviation in zip(
-        problem.free, x.tolist(), beyond.tolist(), errors.std_error.tolist(), strict=True
+    parameters, sensors = [], []
+    for place, (one, variable, further, deviation) in enumerate(
+        zip(problem.variables, x.tolist(), beyond.tolist(), errors.std_error.tolist(), strict=True)
     ):
         value = one.value(variable)
         at_bound = _at_bound(one, value)
@@ -277,12 +349,17 @@ def _estimates(
         elif at_bound:
             below, above = max(0.0, variable - further + below), math.inf
         interval = one.interval(variable, below, above)
-        found.append(
+        std_error = abs(one.slope(variable)) * deviation
+        if place >= len(problem.free):
+            of_sensor = problem.fitted[place - len(problem.free)]
+            sensors.append(estimated(of_sensor, value, std_error, interval, at_bound, problem.runs))
+            continue
+        parameters.append(
             ParameterEstimate(
                 name=one.name,
                 value=value,
-                unit=parameter(one.name).unit,
-                std_error=abs(one.slope(variable)) * deviation,
+                unit=one.unit,
+                std_error=std_error,
                 confidence_interval=interval,
                 start=one.start,
                 lower=one.lower,
@@ -291,7 +368,7 @@ def _estimates(
                 determined=determined(value, 0.5 * (interval[1] - interval[0]), at_bound),
             )
         )
-    return tuple(found)
+    return tuple(parameters), tuple(sensors)
 
 
 def _fitted_run(seen: ComparedRun, residuals: Residuals, r: Array) -> FittedRun:
@@ -306,6 +383,7 @@ def _fitted_run(seen: ComparedRun, residuals: Residuals, r: Array) -> FittedRun:
         name=seen.name,
         samples=len(seen.inputs.time),
         noise=dict(seen.noise),
+        noise_source=dict(seen.noise_source),
         discounted=discounted,
         braking=seen.inputs.braking,
         conditioning=seen.inputs.conditioning,
@@ -332,12 +410,15 @@ def _minimum(ended: list[Found], residuals: Residuals) -> Minimum:
     )
 
 
-def _at_bound(one: FreeParameter, value: float) -> bool:
+def _at_bound(one: Variable, value: float) -> bool:
     return min(value - one.lower, one.upper - value) < AT_BOUND * (one.upper - one.lower)
 
 
 def _outcome(
-    found: Found, estimates: tuple[ParameterEstimate, ...], residuals: Residuals
+    found: Found,
+    estimates: tuple[ParameterEstimate, ...],
+    sensors: tuple[SensorEstimate, ...],
+    residuals: Residuals,
 ) -> Outcome:
     """The sentence for how the fit ended."""
     if found.ending == Ending.BUDGET_SPENT:
@@ -346,7 +427,7 @@ def _outcome(
         return Outcome.STUCK
     if found.cost > residuals.scatter():
         return Outcome.ASTRAY
-    if any(one.at_bound for one in estimates):
+    if any(one.at_bound for one in (*estimates, *sensors)):
         return Outcome.AT_BOUND
     verdicts = {one.determined for one in estimates}
     if "no" in verdicts:

@@ -1,4 +1,4 @@
-"""What an identification is asked: runs, a car, free parameters, and the noise of each channel.
+"""What an identification is asked: runs, a car, free parameters, sensors and their noise.
 
 `Problem.build` checks everything a caller can mend before any simulation, and prepares the inputs
 of the rims mode once for all of them.
@@ -6,8 +6,8 @@ of the rims mode once for all of them.
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TypeVar, get_args
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,11 @@ from .priors import Prior, checked_prior
 from .rims import RimsInputs, filtered_outputs, prepare
 from .rims_settings import RimsSettings
 from .run_notes import DEFAULT_NOISE
+from .sensing import Reading, corrected, where_driven
+from .sensor_model import SensorModel, SensorVariable, sensor_model
 from .simulation import Traction
 from .units import after_number
-from .variables import FreeParameter
+from .variables import FreeParameter, Variable
 from .vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -45,19 +47,24 @@ SENSORS_BEST = 0.02
 class ComparedRun:
     """One run as the fit compares it.
 
-    measured : channel -> (samples,) through the output filter
-    noise : channel -> standard deviation, SI
+    measured : channel -> (samples,) as read, through the output filter
+    noise : channel -> standard deviation of what is read, SI
+    noise_source : channel -> where that is from: "stated", "default" or "fitted"
     """
 
     name: str
     inputs: RimsInputs
     measured: Mapping[str, Array]
     noise: Mapping[str, float]
+    noise_source: Mapping[str, str]
 
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """A checked identification problem; `vehicle` carries the start values."""
+    """A checked identification problem; `vehicle` carries the start values.
+
+    free : parameters to be found;  fitted : what is to be found of the sensors beside them
+    """
 
     vehicle: Vehicle
     runs: tuple[ComparedRun, ...]
@@ -66,6 +73,8 @@ class Problem:
     settings: RimsSettings
     loss: Loss = Loss()
     priors: tuple[Prior, ...] = ()
+    sensors: SensorModel = field(default_factory=SensorModel)
+    fitted: tuple[SensorVariable, ...] = ()
 
     @classmethod
     def build(
@@ -83,6 +92,8 @@ class Problem:
         settings: RimsSettings | None = None,
         loss: Loss | None = None,
         priors: Mapping[str, tuple[float, float]] | None = None,
+        sensors: Mapping[str, Mapping[str, Any]] | None = None,
+        fit_noise: bool = False,
     ) -> "Problem":
         """A problem from its parts, or one sentence on what is wrong with them.
 
@@ -94,6 +105,8 @@ class Problem:
         outputs : channels to compare, for all runs or by run name; all that a run has without
         loss : how much a residual counts; the linear one without
         priors : (mean, standard deviation) of free parameters by name, SI
+        sensors : by channel and quantity a number or "fit" (`sensor_model`); ideal ones without
+        fit_noise : whether the noise is found where `sensors` fixes none
 
         Raises ProblemError, ParameterError, MeasurementError or VehicleError.
         """
@@ -113,17 +126,20 @@ class Problem:
                 f"Bounds are given for {held[0]}, which is not free; free it or leave them out."
             )
         parameters = tuple(_free_parameter(vehicle, name, limits.get(name)) for name in names)
-        compared = _compared_runs(vehicle, runs, noise or {}, outputs, settings)
+        model = sensor_model(
+            sensors or {}, fit_noise=fit_noise, biased=settings.output_highpass_hz is None
+        )
+        compared = _compared_runs(vehicle, runs, noise or {}, outputs, settings, model)
+        fitted = model.variables([(seen.name, seen.measured) for seen in compared])
         samples = sum(len(measured) for seen in compared for measured in seen.measured.values())
-        if samples <= len(parameters):
+        if samples <= (unknown := len(parameters) + len(fitted)):
             raise ProblemError(
-                f"{samples} samples cannot determine {len(parameters)} parameters; free fewer "
+                f"{samples} samples cannot determine {unknown} parameters; free fewer "
                 "or measure longer."
             )
-        stated = (set(run.noise) | set(noise or {}) for run in runs)
         if not any(
-            _moves(run, channel, seen.noise[channel], channel in known)
-            for run, seen, known in zip(runs, compared, stated, strict=True)
+            _moves(run, channel, seen.noise[channel], seen.noise_source[channel] == "stated")
+            for run, seen in zip(runs, compared, strict=True)
             for channel in seen.measured
         ):
             raise ProblemError(_at_rest(compared))
@@ -131,7 +147,26 @@ class Problem:
             checked_prior(name, prior, parameters)
             for name, prior in _by_name(priors or {}, "prior").items()
         )
-        return cls(vehicle, compared, parameters, traction, settings, loss or Loss(), known)
+        return cls(
+            vehicle,
+            compared,
+            parameters,
+            traction,
+            settings,
+            loss or Loss(),
+            known,
+            model,
+            fitted,
+        )
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """All that is to be found, in the order of x: the free parameters, then the sensors'."""
+        return (*self.free, *self.fitted)
+
+    def of_car(self, x: Array) -> Array:
+        """The part of x that is the car's."""
+        return x[: len(self.free)]
 
     def started_at(self, values: Mapping[str, float]) -> "Problem":
         """The same problem from other start values, by name, of the free parameters."""
@@ -140,7 +175,33 @@ class Problem:
 
     def values(self, x: Array) -> Array:
         """The free parameters at the optimiser's variables x."""
-        return np.array([one.value(float(v)) for one, v in zip(self.free, x, strict=True)])
+        of_car = self.of_car(x).tolist()
+        return np.array([one.value(v) for one, v in zip(self.free, of_car, strict=True)])
+
+    def reading(self, x: Array, channel: str, run: str) -> Reading:
+        """The sensor of a run's channel at the optimiser's variables x."""
+        of_sensors = x[len(self.free) :].tolist()
+        found = {
+            one.quantity: one.value(v)
+            for one, v in zip(self.fitted, of_sensors, strict=True)
+            if one.channel == channel and one.run in (None, run)
+        }
+        return self.sensors.reading(channel, found)
+
+    def with_noise(self, found: Mapping[tuple[str, str], float]) -> "Problem":
+        """The same problem with other noise of some channels, found by run and channel."""
+        runs = [
+            replace(
+                seen,
+                noise={name: found.get((seen.name, name), was) for name, was in seen.noise.items()},
+                noise_source={
+                    name: "fitted" if (seen.name, name) in found else was
+                    for name, was in seen.noise_source.items()
+                },
+            )
+            for seen in self.runs
+        ]
+        return replace(self, runs=tuple(runs))
 
     def vehicle_at(self, x: Array) -> Vehicle:
         """The car at the optimiser's variables x."""
@@ -228,6 +289,7 @@ def _compared_runs(
     noise: Mapping[str, float],
     outputs: Sequence[str] | Mapping[str, Sequence[str]] | None,
     settings: RimsSettings,
+    sensors: SensorModel,
 ) -> tuple[ComparedRun, ...]:
     if not runs:
         raise ProblemError("No run is given; give at least one recording.")
@@ -247,10 +309,20 @@ def _compared_runs(
             )
         if not 0.0 < deviation < math.inf:
             raise ProblemError(f"The noise of {channel} is {deviation}; it must be positive.")
+    if twice := [channel for channel in sensors.noise() if channel in noise]:
+        raise ProblemError(
+            f"The noise of {twice[0]} is stated twice, by itself and as sensor.{twice[0]}.noise; "
+            "leave out one of them."
+        )
+    readings = sensors.readings()
+    defaults = {
+        channel: deviation * abs(sensors.reading(channel).gain)
+        for channel, deviation in DEFAULT_NOISE.items()
+    }
     found = []
     for name, run in zip(names, runs, strict=True):
         chosen = outputs.get(name) if isinstance(outputs, Mapping) else outputs
-        measured = filtered_outputs(run, settings.output_band)
+        measured = filtered_outputs(where_driven(run, readings), settings.output_band)
         if not measured:
             raise ProblemError(
                 f"Run {name} has none of {', '.join(OUTPUT_CHANNELS)}; at least one is needed."
@@ -263,13 +335,14 @@ def _compared_runs(
                 raise ProblemError(
                     f"Run {name} has gaps (not a number) in {channel}; leave the channel out."
                 )
-        stated = {**DEFAULT_NOISE, **run.noise, **noise}
+        stated = {**run.noise, **noise, **sensors.noise()}
         found.append(
             ComparedRun(
                 name,
-                prepare(run, vehicle, settings),
+                prepare(corrected(run, readings), vehicle, settings),
                 compared,
-                {channel: float(stated[channel]) for channel in compared},
+                {channel: float((defaults | stated)[channel]) for channel in compared},
+                {channel: "stated" if channel in stated else "default" for channel in compared},
             )
         )
     return tuple(found)

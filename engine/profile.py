@@ -105,7 +105,7 @@ def profile(
     require_free(problem, [known])
     held = [one.name for one in problem.free].index(known)
     residuals = Residuals(problem, simulate, cancelled)
-    start = [one.variable(one.start) for one in problem.free]
+    start = [one.variable(one.start) for one in problem.variables]
     best = Search(residuals).refine(_off_bounds(start, residuals), EVALUATIONS)
     said = information(residuals.of_runs(best.residuals, best.slopes))
     errors = uncertainty(sum(residuals.of_priors(), start=said))
@@ -202,7 +202,8 @@ class _Tour:
     def _point(self, at: float, others: Array, cost: float, distance: float) -> ProfilePoint:
         one = self._problem.free[self._held]
         rest = [each for each in self._problem.free if each is not one]
-        values = {each.name: each.value(float(x)) for each, x in zip(rest, others, strict=True)}
+        of_car = others[: len(rest)]
+        values = {each.name: each.value(float(x)) for each, x in zip(rest, of_car, strict=True)}
         return ProfilePoint(one.value(at), distance, cost, values)
 
 

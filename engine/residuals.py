@@ -4,21 +4,28 @@ In the optimiser's variables (`variables`) the narrow valley along which a bar's
 stays the same, curved in (K_tor, d), is straight in their logarithms. Over all runs and compared
 channels
 
-    r(x) = (model(x) - measured) / noise,
+    r(x) = (sensed(model(x)) - measured) / noise,
 
-and J = dr/dx by differences of second order from ONE batch of 2 n perturbed cars a run:
+where sensed is what the sensors read of the model (`sensing`), and J = dr/dx by differences of
+second order from ONE batch of 2 n perturbed cars a run:
 
     r'(x) = (r(x + a) b^2 - r(x + b) a^2 - r(x) (b^2 - a^2)) / (a b (b - a)),
 
 with a, b = +h, -h, or both to the same side where a bound is nearer than h. h = 1e-4: the error of
 the formula is of order h^2 = 1e-8 of J, that of rounding (1e-16 m in z against a noise of
-0.5 mm) about 1e-13 / h = 1e-9.
+0.5 mm) about 1e-13 / h = 1e-9. What belongs to the sensor of an output has its derivative in closed
+form, without further simulations:
+
+    gain: sign model(t - delay),    bias: 1,    delay: -sign gain model'(t - delay),
+
+each behind the output filter. Sensors of inputs change what drives the model; they are taken by
+differences, each with a car of its own.
 
 A car that leaves the model's range, or is too stiff for the step, gives FAILED_TRIAL in every
 residual: finite, so that the trust region shrinks and the search goes on.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 
@@ -26,13 +33,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .car_rows import car_row
-from .channels import OUTPUT_CHANNELS
+from .channels import INPUT_CHANNELS, OUTPUT_CHANNELS
 from .condensed import triangle
 from .errors import Cancelled
 from .filters import in_band
 from .kernels.lanes import BATCH
 from .problem import Problem
 from .rims import RimsInputs
+from .sensing import IDEAL, delayed, driven, sensed
+from .sensor_model import SensorVariable
 from .simulation import Traction, fit_percent
 from .stability import check_rims_step
 from .uncertainty import Information, RunResiduals
@@ -40,6 +49,9 @@ from .uncertainty import Information, RunResiduals
 Array = NDArray[np.float64]
 Simulate = Callable[[Array, RimsInputs, Traction], Array]
 """(cars (C, CAR_ROWS), inputs, traction) -> (C, samples, 3); a failed car is not a number."""
+
+Histories = Mapping[str, Array]
+"""By run, of z, pitch and roll: (samples, 3), or (cars, samples, 3)."""
 
 DIFFERENCE = 1e-4
 """Step h of the differences of x."""
@@ -78,6 +90,7 @@ def check_start(problem: Problem) -> None:
 class Block:
     """One run's channel in the residual vector.
 
+    time : (samples,) s
     place : where in the vector
     measured : (samples,) SI
     noise : standard deviation, SI
@@ -85,6 +98,7 @@ class Block:
 
     run: str
     channel: str
+    time: Array
     place: slice
     measured: Array
     noise: float
@@ -103,13 +117,17 @@ class Residuals:
     ):
         check_start(problem)
         self.problem = problem
-        ends = [sorted(map(one.variable, (one.lower, one.upper))) for one in problem.free]
+        ends = [sorted(map(one.variable, (one.lower, one.upper))) for one in problem.variables]
         self.lower, self.upper = np.array(ends).T
         self.simulations = 0
         self._simulate = simulate
         self._cancelled = cancelled
-        self._last: tuple[Array, Array] | None = None
+        self._last: tuple[Array, Array, Histories] | None = None
         self._quick: tuple[Array, Array] | None = None
+        at_sensors = list(enumerate(problem.fitted, start=len(problem.free)))
+        self._driving = [k for k, one in at_sensors if one.channel in INPUT_CHANNELS]
+        self._closed = [(k, one) for k, one in at_sensors if one.channel in OUTPUT_CHANNELS]
+        self._simulated = [*range(len(problem.free)), *self._driving]
         places = {one.name: place for place, one in enumerate(problem.free)}
         self._priors = [(one, places[one.name]) for one in problem.priors]
 
@@ -123,7 +141,8 @@ class Residuals:
         for seen in self.problem.runs:
             for channel, measured in seen.measured.items():
                 place = slice(begin, begin + len(measured))
-                found.append(Block(seen.name, channel, place, measured, seen.noise[channel]))
+                time, noise = seen.inputs.time, seen.noise[channel]
+                found.append(Block(seen.name, channel, time, place, measured, noise))
                 begin += len(measured)
         return found
 
@@ -166,7 +185,7 @@ class Residuals:
         ]
 
     def model(self, x: Array) -> dict[str, dict[str, Array]]:
-        """The model's histories by run and channel; not a number where the car fails."""
+        """The model as the sensors read it, by run and channel; not a number where it fails."""
         r = self.vector(x)
         r = np.where(r == FAILED_TRIAL, np.nan, r)
         histories: dict[str, dict[str, Array]] = {}
@@ -178,8 +197,9 @@ class Residuals:
     def vector(self, x: Array) -> Array:
         """r(x), (samples of all blocks,)."""
         if self._last is None or not np.array_equal(self._last[0], x):
-            rows = self._batch([x])
-            self._last = (x.copy(), np.where(np.isfinite(rows[0]), rows[0], FAILED_TRIAL))
+            rows, histories = self._batch([x])
+            r = np.where(np.isfinite(rows[0]), rows[0], FAILED_TRIAL)
+            self._last = x.copy(), r, histories
         return self._last[1]
 
     def quick(self, x: Array) -> tuple[Array, Array]:
@@ -187,17 +207,20 @@ class Residuals:
         minimum, where both are asked for at nearly every point.
         """
         if self._quick is None or not np.array_equal(self._quick[0], x):
+            moved = self._simulated
             step = np.where(x + QUICK_DIFFERENCE <= self.upper, 1.0, -1.0) * QUICK_DIFFERENCE
-            rows = self._batch([x, *(x + np.diag(step))])
+            rows, histories = self._batch([x, *(x + np.diag(step)[moved])])
             centre = np.where(np.isfinite(rows[0]), rows[0], FAILED_TRIAL)
-            columns = ((rows[1:] - centre) / step[:, np.newaxis]).T
-            self._last = x.copy(), centre
+            columns = np.zeros((len(centre), len(x)))
+            columns[:, moved] = ((rows[1:] - centre) / step[moved, np.newaxis]).T
+            self._last = x.copy(), centre, histories
+            self._add_closed(columns, x, histories)
             self._quick = x.copy(), np.nan_to_num(columns)
         return self.vector(x), self._quick[1]
 
     def costs(self, trials: Sequence[Array]) -> Array:
         """The cost at each of many points, infinite where the car fails."""
-        rows = self._batch(trials)
+        rows, _ = self._batch(trials)
         of_priors = [0.5 * float(np.sum(self.prior_rows(x) ** 2)) for x in trials]
         return np.nan_to_num(self.problem.loss.costs(rows), nan=np.inf) + np.array(of_priors)
 
@@ -256,48 +279,110 @@ class Residuals:
         order; where both fail the column is zero, which makes the parameter undetermined.
         """
         centre = self.vector(x)
-        n = len(x)
         first = np.where(x + DIFFERENCE <= self.upper, DIFFERENCE, -2.0 * DIFFERENCE)
         second = np.where(x - DIFFERENCE >= self.lower, -DIFFERENCE, 2.0 * DIFFERENCE)
-        steps = np.concatenate([first, second])
-        trials = x + np.tile(np.eye(n), (2, 1)) * steps[:, np.newaxis]
-        rows = self._batch(list(trials))
-        columns = np.zeros((len(centre), n))
-        for k, (a, b) in enumerate(zip(first, second, strict=True)):
-            fine = [bool(np.isfinite(rows[car]).all()) for car in (k, n + k)]
+        moved, n = self._simulated, len(self._simulated)
+        trials = x + np.concatenate([np.diag(first)[moved], np.diag(second)[moved]])
+        rows, _ = self._batch(list(trials))
+        columns = np.zeros((len(centre), len(x)))
+        for car, k in enumerate(moved):
+            a, b = first[k], second[k]
+            fine = [bool(np.isfinite(rows[one]).all()) for one in (car, n + car)]
             if all(fine):
-                weighted = rows[k] * b**2 - rows[n + k] * a**2 - centre * (b**2 - a**2)
+                weighted = rows[car] * b**2 - rows[n + car] * a**2 - centre * (b**2 - a**2)
                 columns[:, k] = weighted / (a * b * (b - a))
             elif any(fine):
-                row, step = (rows[k], a) if fine[0] else (rows[n + k], b)
+                row, step = (rows[car], a) if fine[0] else (rows[n + car], b)
                 columns[:, k] = (row - centre) / step
+        if self._last is not None:
+            self._add_closed(columns, x, self._last[2])
         return columns
 
-    def _batch(self, trials: Sequence[Array]) -> Array:
-        """Residuals of many cars, (cars, samples of all blocks); a failed car is not a number."""
-        cars = self.problem.cars_at(trials)
-        possible = np.isfinite(cars).all(axis=1)
+    def _add_closed(self, columns: Array, x: Array, histories: Histories) -> None:
+        """Fill in the columns of what belongs to the outputs' sensors, from the model at x."""
+        for k, one in self._closed:
+            slope = one.slope(float(x[k]))
+            for block in self.blocks():
+                if block.channel == one.channel and one.run in (None, block.run) and histories:
+                    model = histories[block.run][:, OUTPUT_CHANNELS.index(block.channel)]
+                    change = self._filtered(block.time, self._change(one, block, model, x))
+                    columns[block.place, k] = slope * change / block.noise
+
+    def _change(self, one: SensorVariable, block: Block, model: Array, x: Array) -> Array:
+        """d reading / d quantity (samples,) of a model's history."""
+        if one.quantity == "bias":
+            return np.ones_like(model)
+        reading = self.problem.reading(x, block.channel, block.run)
+        late, rates = delayed(block.time, model, reading.delay)
+        if one.quantity == "delay":
+            return -reading.gain * rates
+        return late * np.copysign(1.0, reading.gain)
+
+    def _batch(self, trials: Sequence[Array]) -> tuple[Array, Histories]:
+        """Residuals of many cars, (cars, samples of all blocks), and the model's histories of the
+        first; a failed car is not a number, and has none.
+        """
         blocks = self.blocks()
         rows = np.full((len(trials), blocks[-1].place.stop), np.nan)
-        if not possible.any():
-            return rows
-        histories = self._histories(cars[possible])
-        for block in blocks:
-            model = histories[block.run][:, :, OUTPUT_CHANNELS.index(block.channel)]
-            rows[possible, block.place] = (model - block.measured) / block.noise
+        of_first: Histories = {}
+        for alike in self._alike(trials):
+            cars = self.problem.cars_at([trials[k] for k in alike])
+            possible = alike[np.isfinite(cars).all(axis=1)]
+            if not len(possible):
+                continue
+            cars = cars[np.isfinite(cars).all(axis=1)]
+            histories = self._histories(cars, self._inputs(trials[possible[0]]))
+            for block in blocks:
+                model = histories[block.run][:, :, OUTPUT_CHANNELS.index(block.channel)]
+                read = self._read(block, model, [trials[k] for k in possible])
+                rows[possible, block.place] = (read - block.measured) / block.noise
+            if possible[0] == 0 and np.isfinite(rows[0]).all():
+                of_first = {name: of_run[0] for name, of_run in histories.items()}
         rows[~np.isfinite(rows).all(axis=1)] = np.nan
-        return rows
+        return rows, of_first
 
-    def _histories(self, cars: Array) -> dict[str, Array]:
-        """By run (cars, samples, 3), filtered; the runs side by side, looking at `cancelled`."""
+    def _alike(self, trials: Sequence[Array]) -> list[NDArray[np.int64]]:
+        """Places of the trials that are driven by the same inputs."""
+        places: dict[bytes, list[int]] = {}
+        for k, x in enumerate(trials):
+            places.setdefault(x[self._driving].tobytes(), []).append(k)
+        return [np.array(alike) for alike in places.values()]
+
+    def _inputs(self, x: Array) -> list[RimsInputs]:
+        """What drives the model in each run, with the inputs' sensors at x."""
+        if not self._driving:
+            return [seen.inputs for seen in self.problem.runs]
+        known = self.problem.sensors.readings()
+        return [
+            driven(
+                seen.inputs,
+                {
+                    name: self.problem.reading(x, name, seen.name).beyond(known.get(name, IDEAL))
+                    for name in INPUT_CHANNELS
+                },
+            )
+            for seen in self.problem.runs
+        ]
+
+    def _read(self, block: Block, model: Array, trials: Sequence[Array]) -> Array:
+        """What the sensors of many cars read of a channel (cars, samples), filtered."""
+        fine = np.isfinite(model).all(axis=1)
+        histories = np.where(fine[:, np.newaxis], model, 0.0)
+        if block.channel in self.problem.sensors:
+            readings = [self.problem.reading(x, block.channel, block.run) for x in trials]
+            histories = sensed(block.time, histories, readings)
+        return np.where(fine[:, np.newaxis], self._filtered(block.time, histories), np.nan)
+
+    def _histories(self, cars: Array, inputs: Sequence[RimsInputs]) -> Histories:
+        """By run (cars, samples, 3); the runs side by side, looking at `cancelled`."""
         pool = ThreadPoolExecutor(RUNS_AT_ONCE)
         try:
             parts = [
                 [
-                    pool.submit(self._simulate, some, seen.inputs, self.problem.traction)
-                    for some in _parts(cars, len(seen.inputs.node_time))
+                    pool.submit(self._simulate, some, of_run, self.problem.traction)
+                    for some in _parts(cars, len(of_run.node_time))
                 ]
-                for seen in self.problem.runs
+                for of_run in inputs
             ]
             pending = {future for run in parts for future in run}
             while pending:
@@ -306,20 +391,15 @@ class Residuals:
             self.simulations += len(cars) * len(parts)
             done = ([future.result() for future in run] for run in parts)
             return {
-                seen.name: self._filtered(seen.inputs.time, np.concatenate(of_run))
+                seen.name: np.concatenate(of_run)
                 for seen, of_run in zip(self.problem.runs, done, strict=True)
             }
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
 
-    def _filtered(self, time: Array, histories: Array) -> Array:
-        """Histories (cars, samples, 3) through the output filter; a failed car stays as it is."""
-        band = self.problem.settings.output_band
-        if band == (None, None):
-            return histories
-        columns = np.nan_to_num(histories).transpose(1, 0, 2).reshape(len(time), -1)
-        filtered = in_band(time, columns, band).reshape(len(time), len(histories), -1)
-        return np.where(np.isfinite(histories), filtered.transpose(1, 0, 2), np.nan)
+    def _filtered(self, time: Array, values: Array) -> Array:
+        """Histories (..., samples) through the output filter."""
+        return in_band(time, values.T, self.problem.settings.output_band).T
 
     def _stop_if_cancelled(self) -> None:
         if self._cancelled is not None and self._cancelled():

@@ -116,8 +116,20 @@ class Search:
         self.cost_history: list[float] = []
         self.turn: tuple[int, int] = (1, 1)
         self._progress = progress
+        self._simulations_before = 0
+        self._best_cost = np.inf
         self._quick = False
         self._minima: Sequence[Found] = ()
+
+    @property
+    def simulations(self) -> int:
+        """Behind all refinements."""
+        return self._simulations_before + self.residuals.simulations
+
+    def weigh(self, residuals: Residuals) -> None:
+        """Go on with other residuals of the same variables, whose costs do not compare."""
+        self._simulations_before = self.simulations
+        self.residuals, self._best_cost = residuals, np.inf
 
     def explore(self, x: Array, most_evaluations: int, minima: Sequence[Found]) -> Found:
         """Search from x with quick derivatives; cut short in the basin of one of `minima`, else
@@ -179,9 +191,9 @@ class Search:
         cost = self.residuals.cost(x, r)
         self.evaluations += 1
         self._failures += bool(np.any(r == FAILED_TRIAL))
-        if not self.cost_history or cost < self.cost_history[-1]:
-            self._best = x.copy(), r
-        self.cost_history.append(min([cost, *self.cost_history[-1:]]))
+        if cost < self._best_cost:
+            self._best, self._best_cost = (x.copy(), r), cost
+        self.cost_history.append(self._best_cost)
         if self._progress is not None:
             self._progress(self._state())
         rows, _ = self.residuals.reweighted(x, r)
@@ -207,7 +219,7 @@ class Search:
         values = problem.values(x).tolist()
         return Progress(
             evaluations=self.evaluations,
-            simulations=self.residuals.simulations,
+            simulations=self.simulations,
             cost=self.cost_history[-1],
             parameters={one.name: v for one, v in zip(problem.free, values, strict=True)},
             fit_percent=self.residuals.percents(r),

@@ -146,6 +146,15 @@ class Uncertainty:
         np.fill_diagonal(correlation, 1.0)
         return correlation
 
+    def marginal(self, first: int) -> "Uncertainty":
+        """Errors of the first variables, whatever the others are."""
+        # What is left of the unknown directions among the first, and the covariance beside it.
+        _, parts, axes = np.linalg.svd(self.unknown[:, :first])
+        unknown = axes[: len(parts)][parts > PART_OF_DIRECTION]
+        beside = np.eye(first) - unknown.T @ unknown
+        covariance = beside @ self.covariance[:first, :first] @ beside
+        return Uncertainty(covariance, unknown, self.quantile, self.alone[:first])
+
     def error_of(self, gradient: Array) -> float:
         """Standard error of a quantity whose derivative by x is `gradient` (n,); infinite where it
         has a part in an unknown direction.

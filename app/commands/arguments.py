@@ -1,5 +1,5 @@
 """What is written in arguments: NAME=VALUE, NAME=LOW:HIGH, NAME=LOW:HIGH:COUNT,
-NAME=VALUE~DEVIATION, [RUN=]BEGIN:END, a frequency, a whole number.
+NAME=VALUE~DEVIATION, CHANNEL.QUANTITY=VALUE, [RUN=]BEGIN:END, a frequency, a whole number.
 """
 
 import math
@@ -15,10 +15,12 @@ from ...engine.errors import RideError
 from ...engine.loss import Loss
 from ...engine.parameters import number_path, parameter
 from ...engine.rims_settings import RimsSettings
+from ...engine.sensor_model import FIT, sensor_path
 
 VALUE = "NAME=VALUE in SI units"
 LIMITS = "NAME=LOW:HIGH in SI units"
 PRIOR = "NAME=VALUE~DEVIATION in SI units, or ~PERCENT%"
+SENSOR = "CHANNEL.QUANTITY=VALUE in SI units"
 LEVELS = "NAME=LOW:HIGH:COUNT or NAME=V1,V2,... in SI units"
 FREQUENCY = "a frequency in Hz, or none"
 INTERVAL = "BEGIN:END in seconds, or none"
@@ -65,6 +67,30 @@ def priors(assignments: Iterable[str]) -> dict[str, tuple[float, float]]:
         else:
             known[name] = mean, _number(second, argument, PRIOR)
     return known
+
+
+def sensors(options: Namespace) -> dict[str, dict[str, float | str]]:
+    """What is known and what is to be found of sensors, by channel and quantity."""
+    told: dict[str, dict[str, float | str]] = {}
+    for argument, path, value in (
+        *(_fixed_sensor(assignment) for assignment in options.sensor),
+        *((f"--fit-sensor {path}", path, FIT) for path in options.fit_sensor),
+    ):
+        name, quantity = sensor_path(path)
+        of_channel = told.setdefault(name, {})
+        if quantity in of_channel:
+            raise ArgumentError(f"{argument} sets {name}.{quantity} a second time; set it once.")
+        of_channel[quantity] = value
+    return told
+
+
+def _fixed_sensor(assignment: str) -> tuple[str, str, float]:
+    """The argument, the sensor's path and the value of CHANNEL.QUANTITY=VALUE."""
+    argument = f"--sensor {assignment}"
+    path, _, text = assignment.partition("=")
+    if not (path and text):
+        raise ArgumentError(f"{argument} sets no quantity of a sensor; write {SENSOR}.")
+    return argument, path, _number(text, argument, SENSOR)
 
 
 def loss(options: Namespace) -> Loss:

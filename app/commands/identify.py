@@ -14,7 +14,7 @@ from ...engine.parameters import DAMPER_NAMES, PARAMETER_NAMES, parameter
 from ...engine.problem import Problem
 from ...engine.profile import Profile, profile, require_free
 from ...engine.vehicle import Vehicle
-from .arguments import bounds, loss, priors, rims_settings, starts, whole
+from .arguments import bounds, loss, priors, rims_settings, sensors, starts, whole
 from .inputs import find_mapping, find_vehicle, read_noise, read_runs, recording_files
 from .output import (
     print_fit_percent,
@@ -40,6 +40,7 @@ def identify(options: Namespace) -> None:
     fit = fitted(options, problem)
     print_fit(fit)
     solved = problem.started_at({one.name: one.value for one in fit.parameters})
+    solved = solved.with_noise(fit.found_noise)
     profiles = [profile(solved, name) for name in profiled]
     _print_profiles(profiles)
     if options.output:
@@ -60,6 +61,8 @@ def asked(options: Namespace, vehicle: Vehicle, runs: Sequence[Run]) -> Problem:
         settings=rims_settings(options),
         loss=loss(options),
         priors=priors(options.prior),
+        sensors=sensors(options),
+        fit_noise=options.fit_noise,
     )
 
 
@@ -97,12 +100,12 @@ def _show(progress: Progress) -> None:
 def print_fit(fit: Fit) -> None:
     """Print parameters, fit percents, outcome and warnings."""
     rows = [("parameter", "value", "± (95 %)", "unit", "determined")]
-    for estimate in fit.parameters:
+    for estimate in (*fit.parameters, *fit.sensors):
         lower, upper = estimate.confidence_interval
         half = (upper - lower) / 2.0
         rows.append(
             (
-                estimate.name,
+                estimate.title,
                 significant(estimate.value, 5),
                 significant(half, 2) if math.isfinite(half) else "unknown",
                 estimate.unit,
@@ -119,6 +122,9 @@ def print_fit(fit: Fit) -> None:
     for sentence in fit.verdict.sentences:
         print(sentence)
     print_warnings(fit.warnings)
+    for offer in fit.offers:
+        for quantity, value in offer.sensor.items():
+            print(f"{offer.sentence} Add --sensor {offer.channel}.{quantity}={value:.9g}.")
 
 
 def _print_profiles(profiles: Sequence[Profile]) -> None:

@@ -3,8 +3,10 @@
 import hashlib
 import json
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from ...engine.channels import Run
 from ...engine.errors import VehicleError
@@ -12,6 +14,8 @@ from ...engine.fit_file import fit_to_json
 from ...engine.json_text import read_json
 from ...engine.manoeuvre import Manoeuvre, read_manoeuvre
 from ...engine.run_notes import manoeuvre_beside
+from ...engine.sensing import corrected
+from ...engine.sensor_model import readings_in
 from ...engine.validation import (
     Case,
     Geometry,
@@ -50,9 +54,10 @@ def validate(options: Namespace) -> None:
     check_cases(cases)
     fit = fitted(options, asked(options, vehicle, runs[: len(options.runs)]))
     print_fit(fit)
+    found = fit_to_json(fit)
     validation = predict(
         fit.vehicle,
-        cases,
+        [_as_it_moved(case, found, place) for place, case in enumerate(cases)],
         traction=options.traction or "exact",
         settings=rims_settings(options),
     )
@@ -62,7 +67,7 @@ def validate(options: Namespace) -> None:
         {"name": run.name, "sha256": hashlib.sha256(Path(path).read_bytes()).hexdigest()}
         for run, path in zip(runs, paths, strict=True)
     ]
-    document = validation_to_json(validation, fit_to_json(fit), geometry, made(recordings))
+    document = validation_to_json(validation, found, geometry, made(recordings))
     write_file(options.output, report(document))
     print(f"Wrote {options.output}: open it in a browser, whose print makes a PDF of it.")
     if options.json:
@@ -115,6 +120,12 @@ def _cases(runs: Sequence[Run], fits: int, manoeuvres: dict[int, Manoeuvre]) -> 
         Case(run, "fit" if place < fits else "hold-out", manoeuvres.get(place))
         for place, run in enumerate(runs)
     ]
+
+
+def _as_it_moved(case: Case, fit: Mapping[str, Any], place: int) -> Case:
+    """A case with the motion behind what its sensors read, as the fit knows them."""
+    name = fit["runs"][place]["name"] if case.role == "fit" else None
+    return replace(case, run=corrected(case.run, readings_in(fit, name)))
 
 
 def _print(validation: Validation) -> None:

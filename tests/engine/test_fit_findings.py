@@ -16,13 +16,13 @@ BODY = 0.01 * np.sin(7.0 * TIME) + 0.003 * np.cos(3.0 * TIME)
 
 def test_a_channel_turned_over_is_named_with_its_remedy():
     finding = wrong_sign("lap 1", "chassis.z", -BODY, BODY, BODY)
-    assert "chassis.z of run lap 1" in finding
-    assert "multiply it by -1" in finding
+    assert "chassis.z of run lap 1" in finding.sentence
+    assert "multiply it by -1" in finding.sentence
 
 
 def test_a_turned_channel_that_the_fit_has_bent_the_car_to_is_still_named():
-    assert "at the start values" in wrong_sign("lap", "chassis.z", -BODY, BODY, -BODY)
-    assert "after the fit" in wrong_sign("lap", "chassis.z", -BODY, -0.1 * BODY, BODY)
+    assert "at the start values" in wrong_sign("lap", "chassis.z", -BODY, BODY, -BODY).sentence
+    assert "after the fit" in wrong_sign("lap", "chassis.z", -BODY, -0.1 * BODY, BODY).sentence
 
 
 def test_a_badly_guessed_start_is_no_wrong_sign():
@@ -44,8 +44,8 @@ def test_a_badly_guessed_start_is_no_wrong_sign():
 def test_a_mistaken_unit_shows_in_the_amplitude(channel, factor, numbers, header, guess):
     """The start values may be off by nearly a factor of two."""
     finding = wrong_unit("lap", channel, factor * BODY, guess * BODY)
-    assert f"{channel} of run lap" in finding
-    assert f"in {numbers} under a header that says {header}" in finding
+    assert f"{channel} of run lap" in finding.sentence
+    assert f"in {numbers} under a header that says {header}" in finding.sentence
 
 
 def test_a_spike_is_no_mistaken_unit():
@@ -61,7 +61,7 @@ def test_a_car_that_stands_most_of_the_time_has_no_mistaken_unit():
     bump = 0.01 * np.exp(-(((time - 100.0) / 0.3) ** 2)) * np.sin(8.0 * (time - 100.0))
     noisy = bump + 1e-4 * np.random.default_rng(8).normal(size=time.size)
     assert wrong_unit("lap", "chassis.z", noisy, bump) is None
-    assert "multiply it by -1" in wrong_sign("lap", "chassis.z", -noisy, bump, bump)
+    assert "multiply it by -1" in wrong_sign("lap", "chassis.z", -noisy, bump, bump).sentence
 
 
 def test_a_channel_at_rest_in_the_model_has_no_unit_to_mistake():
@@ -98,7 +98,7 @@ def test_a_channel_buried_in_its_stated_noise_is_not_blamed():
 def test_a_dead_channel_is_named():
     """A channel at rest is dead only where the model moves by more than the noise."""
     still = np.zeros_like(TIME)
-    assert "never moves" in dead_sensor("lap", "chassis.roll", still, BODY, 5e-4)
+    assert "never moves" in dead_sensor("lap", "chassis.roll", still, BODY, 5e-4).sentence
     assert dead_sensor("lap", "chassis.roll", still, 1e-3 * BODY, 5e-4) is None
     assert dead_sensor("lap", "chassis.roll", BODY, BODY, 5e-4) is None
 
