@@ -15,7 +15,7 @@ from ..engine.manoeuvre import Manoeuvre, manoeuvre_from_json
 from ..engine.vehicle_file import vehicle_from_json
 from .errors import InvalidRequest, OverBudget
 from .excitation import known_manoeuvre
-from .identification_job import build_problem, done, marked_runs
+from .identification_job import UNTOLD, build_problem, done, marked_runs
 from .job_store import Job
 from .recordings import Recordings
 from .schemas import AdviceRequest
@@ -55,10 +55,11 @@ def advice(
             f"The field {told} means nothing with identification, which has its own; leave it out.",
             field=told,
         )
-    spec = {**fitted.spec, "vehicle": done(fitted)["vehicle"], "start": {}}
+    fit = done(fitted)
+    spec = {**UNTOLD, **fitted.spec, "vehicle": fit["vehicle"], "start": {}}
     kept = [store.measurement(session, run["id"]) for run in spec["runs"]]
     stated = [replace(one, noise=run["noise"]) for one, run in zip(kept, spec["runs"], strict=True)]
-    problem = build_problem(spec, marked_runs(spec, stated, recordings))
+    problem = build_problem(spec, marked_runs(spec, stated, recordings)).as_fitted(fit)
     return advisory_to_json(advise(problem, candidates, planned=request.planned))
 
 

@@ -22,7 +22,7 @@ KIND = "identification"
 
 UNTOLD = {
     name: IdentificationRequest.model_fields[name].get_default()
-    for name in ("starts", "seed", "loss", "loss_scale", "priors")
+    for name in ("starts", "seed", "loss", "loss_scale", "priors", "sensors", "fit_noise")
 }
 """What holds of a job kept from before these could be told."""
 
@@ -42,6 +42,10 @@ def of_recordings(task: Task, store: Store, recordings: Recordings) -> Kind:
 def as_asked(request: IdentificationRequest) -> str:
     """What stands for a request: the same whenever it is sent, however it calls the parameters."""
     form = request.model_dump(mode="json", exclude={"key"})
+    # Left out where nothing is told, as by requests from before they could be.
+    for later in ("sensors", "fit_noise"):
+        if not form[later]:
+            del form[later]
     for role in ("free", "fixed"):
         if form[role] is not None:
             form[role] = sorted(parameter(name).name for name in form[role])
@@ -91,6 +95,8 @@ def build_problem(spec: Mapping[str, Any], runs: list[Run]) -> Any:
         settings=RimsSettings(**spec["settings"]),
         loss=Loss(spec["loss"], spec["loss_scale"]),
         priors={name: (mean, deviation) for name, (mean, deviation) in spec["priors"].items()},
+        sensors=spec["sensors"],
+        fit_noise=spec["fit_noise"],
     )
     check_start(problem)
     return problem
@@ -137,16 +143,36 @@ def done(fitted: Job) -> Any:
     return fitted.result
 
 
-def check_budget(measurements: list[Measurement], step: float, limits: Limits) -> None:
-    """Refuse recordings that together are longer than an identification may take.
+def check_budget(
+    measurements: list[Measurement],
+    step: float,
+    limits: Limits,
+    *,
+    starts: int = 1,
+    fit_noise: bool = False,
+) -> None:
+    """Refuse recordings that together take longer than an identification may.
 
     step : of the integration, s
     """
+    from ..engine.multistart import fits_of
+    from ..engine.noise_rounds import NOISE_ROUNDS
+
     total = sum(
         max(kept.summary["samples"], kept.summary["duration"] / step) for kept in measurements
     )
-    if total > limits.identified_samples:
+    fits = fits_of(starts) + (NOISE_ROUNDS if fit_noise else 0)
+    if total * fits > limits.identified_samples:
+        work = f"{total:.0f} samples or steps together"
+        if fits > 1.0:
+            work += f", and as much work as {fits:.0f} fits is asked of them"
+        fewer = "".join(
+            f" {remedy},"
+            for remedy, asked in (("fewer starts", starts > 1), ("noise that is stated", fit_noise))
+            if asked
+        )
         raise OverBudget(
-            f"The runs have {total:.0f} samples or steps together, an identification takes at most "
-            f"{limits.identified_samples}; choose fewer or shorter runs, or a longer step."
+            f"The runs have {work}, an identification takes at most "
+            f"{limits.identified_samples} in all; choose{fewer} fewer or shorter runs, or a longer "
+            "step."
         )

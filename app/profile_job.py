@@ -29,6 +29,7 @@ def check_and_fill(request: ProfileRequest, fitted: Job) -> dict[str, Any]:
         "identification": fitted.id,
         "parameter": name,
         "start": {**fitted.spec["start"], **ended},
+        "ended": {key: fitted.result.get(key, []) for key in ("parameters", "sensors", "runs")},
     }
 
 
@@ -40,7 +41,7 @@ def profile_parameter(
     from ..engine.profile import profile
 
     found = profile(
-        build_problem(payload, payload["runs"]),
+        build_problem(payload, payload["runs"]).as_fitted(payload["ended"]),
         payload["parameter"],
         progress=lambda points: report({"points": points}),
         cancelled=cancelled,

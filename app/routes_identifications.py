@@ -22,6 +22,7 @@ from .services import Services, Shared
 ASKED = (
     *("runs", "free", "fixed", "bounds", "start", "noise", "traction", "settings", "braking"),
     *("starts", "seed", "loss", "loss_scale", "priors"),
+    *("sensors", "fit_noise"),
 )
 """Fields of a request that its job shows, with what held untold filled in; of each run its id, its
 name, the noise that was stated of it and what was done to it."""
@@ -46,7 +47,13 @@ async def submit(sid: SessionId, services: Shared, body: IdentificationRequest) 
 def _spec(services: Services, sid: str, body: IdentificationRequest) -> dict[str, Any]:
     """Everything that the job needs, checked."""
     kept = [services.store.measurement(sid, measurement) for measurement in body.runs]
-    check_budget(kept, body.settings.step, services.settings.limits)
+    check_budget(
+        kept,
+        body.settings.step,
+        services.settings.limits,
+        starts=body.starts,
+        fit_noise=body.fit_noise,
+    )
     vehicle = services.store.session(sid).vehicle if body.vehicle is None else body.vehicle
     spec = body.model_dump(mode="json", exclude={"key", "runs", "vehicle"})
     spec["vehicle"] = vehicle_to_json(vehicle_from_json(vehicle))

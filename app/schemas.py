@@ -307,6 +307,20 @@ class ProfileRequest(WireForm):
     key: Name | None = None
 
 
+def _number_or_fit(value: Any) -> Any:
+    """As `_key_or_object`, of a sensor's quantity."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not (number or value == "fit"):
+        raise PydanticCustomError("quantity", 'give a number or "fit"')
+    return value
+
+
+SensorForm = Annotated[
+    dict[Name, Annotated[Number | Literal["fit"], BeforeValidator(_number_or_fit)]],
+    Field(max_length=10),
+]
+
+
 class IdentificationRequest(WireForm):
     """Find parameters of the session's car (or of another start) from measurements.
 
@@ -314,6 +328,9 @@ class IdentificationRequest(WireForm):
     starts, seed : points tried as starts, the told one and others between the bounds
     loss, loss_scale : how much outliers count, and from how many noises on they are ones
     priors : by parameter its mean and standard deviation, known before the runs, SI
+    sensors : by channel what its sensor is known to do, SI, or "fit" for what is to be found:
+        delay, gain, bias, sign and noise
+    fit_noise : find the noise of all compared channels for which `sensors` says none
     """
 
     runs: Annotated[list[Name], Field(max_length=20)]
@@ -331,4 +348,6 @@ class IdentificationRequest(WireForm):
     loss: LossName = "linear"
     loss_scale: Annotated[Number, Field(ge=SMALLEST_SCALE, le=LARGEST_SCALE)] = DEFAULT_SCALE
     priors: Annotated[dict[Name, tuple[Number, Number]], Field(max_length=50)] = {}
+    sensors: Annotated[dict[Name, SensorForm], Field(max_length=50)] = {}
+    fit_noise: Flag = False
     key: Name | None = None

@@ -112,14 +112,21 @@ def _cases(spec: Mapping[str, Any], runs: list[Any]) -> list[Any]:
 def validate_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -> WithFile:
     """On the worker: predict every run, reporting how far it is; the document as a file."""
     from ..engine.rims_settings import RimsSettings
+    from ..engine.sensing import corrected
+    from ..engine.sensor_model import readings_in
     from ..engine.validation import geometry_from_json, validate
     from ..engine.validation_file import validation_to_json
     from .report import made
 
     fit, geometry = payload["fit"], payload["geometry"]
+    fitted = [run["name"] for run in fit["runs"]]
+    moved = [
+        corrected(run, readings_in(fit, fitted[place] if one["role"] == "fit" else None))
+        for place, (one, run) in enumerate(zip(payload["runs"], payload["recordings"], strict=True))
+    ]
     found = validate(
         vehicle_from_json(fit["vehicle"]),
-        _cases(payload, payload["recordings"]),
+        _cases(payload, moved),
         traction=fit["traction"],
         settings=RimsSettings(**fit["settings"]),
         progress=lambda done, of: report({"predictions": done, "of": of}),

@@ -47,6 +47,7 @@ from .rims_settings import RimsSettings
 from .run_notes import DEFAULT_NOISE
 from .simulation import SAMPLE_STEP, rims_batch
 from .uncertainty import Information, Uncertainty, information, uncertainty
+from .variables import Variable
 from .vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -145,7 +146,7 @@ def advise(
     """
     began = time.perf_counter()
     residuals = Residuals(problem, rims_batch)
-    x = _variables(problem.free)
+    x = _variables(problem.variables)
     r = residuals.vector(x)
     if np.any(r == FAILED_TRIAL):
         raise ProblemError(
@@ -154,6 +155,7 @@ def advise(
     runs = residuals.of_runs(r, residuals.jacobian(x))
     known = sum(residuals.of_priors(), start=information(runs))
     noise = noise_of_runs(problem, runs, known.root)
+    known = known.marginal(len(problem.free))
     return _advised(problem, known, noise, candidates or catalogue(), planned, began)
 
 
@@ -304,7 +306,7 @@ def _ranked(
     return [advice for _, _, advice in scored]
 
 
-def _variables(free: Sequence[FreeParameter]) -> Array:
+def _variables(free: Sequence[Variable]) -> Array:
     return np.array([one.variable(one.start) for one in free])
 
 

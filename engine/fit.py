@@ -329,16 +329,6 @@ class Fit:
     whiteness: tuple[Whiteness, ...]
     verdict: Verdict
 
-    @property
-    def found_noise(self) -> dict[tuple[str, str], float]:
-        """The noise that was fitted, by run and channel, SI."""
-        return {
-            (run.name, channel): run.noise[channel]
-            for run in self.runs
-            for channel, source in run.noise_source.items()
-            if source == "fitted"
-        }
-
 
 def determined(value: float, half_width: float, at_bound: bool = False) -> str:
     """ "yes", "weakly" or "no"."""

@@ -43,10 +43,10 @@ from .fit_findings import (
 )
 from .initial_state import swings_in
 from .multistart import refined_starts, spread
+from .noise_rounds import with_found_noise
 from .prior_checks import disagreements, prior_checks
-from .problem import SENSORS_BEST, ComparedRun, FreeParameter, Problem
+from .problem import ComparedRun, FreeParameter, Problem
 from .residuals import FAILED_TRIAL, Residuals, Simulate
-from .run_notes import DEFAULT_NOISE
 from .search import Found, Search
 from .search_settings import MOST_STARTS
 from .sensor_findings import estimated, offers
@@ -78,15 +78,6 @@ between the bounds."""
 
 MUCH_BETTER = 0.5
 """Such a car is taken when its cost is below this share of the start's."""
-
-NOISE_ROUNDS = 2
-"""Fits at most with noise from the residuals of the fit before, unless ..."""
-
-SAME_NOISE = 0.01
-"""... none of it changes by more than this share."""
-
-MEDIAN_OF_NORMAL = 0.6745
-"""Median of |e| over the standard deviation of a normal e."""
 
 
 def identify(
@@ -134,7 +125,7 @@ def identify(
     others = [np.concatenate([of_car, of_sensors]) for of_car in others]
     reached = refined_starts(search, x_start, others, most_evaluations)
     if not doubted:
-        reached = _with_found_noise(search, reached, most_evaluations)
+        reached = with_found_noise(search, reached, most_evaluations)
     told, residuals = problem.runs, search.residuals
     problem, solution = residuals.problem, reached[0][0]
     r = solution.residuals
@@ -246,48 +237,6 @@ def _usable_start(residuals: Residuals, x: Array) -> tuple[Array, list[str]]:
         if not failed:
             return x, []
     raise ProblemError(_failure(residuals.problem))
-
-
-def _with_found_noise(
-    search: Search, reached: list[list[Found]], most_evaluations: int
-) -> list[list[Found]]:
-    """The minima, refined with the noise that is to be found from their lowest's residuals."""
-    for _ in range(NOISE_ROUNDS):
-        noise = _found_noise(search.residuals, reached[0][0].residuals)
-        known = {seen.name: seen.noise for seen in search.residuals.problem.runs}
-        if all(
-            abs(one - known[run][channel]) <= SAME_NOISE * one
-            for (run, channel), one in noise.items()
-        ):
-            break
-        search.weigh(search.residuals.of(search.residuals.problem.with_noise(noise)))
-        reached = [
-            [replace(search.refine(of[0].x, most_evaluations), told=of[0].told), *of[1:]]
-            for of in reached
-        ]
-        reached.sort(key=lambda of: of[0].cost)
-    return reached
-
-
-def _found_noise(residuals: Residuals, r: Array) -> dict[tuple[str, str], float]:
-    """By run and channel, standard deviation of the residuals where the noise is to be found; by
-    their median where a loss expects outliers.
-    """
-    problem, found = residuals.problem, {}
-    if np.any(r == FAILED_TRIAL):
-        return {}
-    for block in residuals.blocks():
-        if problem.sensors.fits_noise(block.channel):
-            left = np.abs(r[block.place])
-            size = (
-                float(np.sqrt(np.mean(left**2)))
-                if problem.loss.name == "linear"
-                else float(np.median(left)) / MEDIAN_OF_NORMAL
-            )
-            gain = abs(problem.sensors.reading(block.channel).gain)
-            least = SENSORS_BEST * DEFAULT_NOISE[block.channel] * gain
-            found[block.run, block.channel] = max(size * block.noise, least)
-    return found
 
 
 def _swings(problem: Problem, fitted: Histories) -> list[str]:

@@ -15,6 +15,7 @@ from .loss import Loss
 from .parameters import parameter
 from .problem import FreeParameter
 from .rims_settings import RimsSettings
+from .sensor_model import asked_in
 from .simulation import Traction
 from .uncertainty import Uncertainty
 from .vehicle import Vehicle
@@ -32,6 +33,8 @@ class KeptFit:
     errors : of these variables
     braking : where the car was taken to brake, by the runs' names, s
     priors : (mean, standard deviation) by parameter, SI
+    sensors : what was known of them and what was found, as a problem takes it
+    ended : the JSON
     """
 
     vehicle: Vehicle
@@ -42,6 +45,8 @@ class KeptFit:
     braking: Mapping[str, tuple[Interval, ...]]
     loss: Loss = Loss()
     priors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    sensors: Mapping[str, Mapping[str, float | str]] = field(default_factory=dict)
+    ended: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def x(self) -> Array:
@@ -92,6 +97,8 @@ def fit_from_json(data: Any, source: str = "fit") -> KeptFit:
             },
             Loss(data["loss"], float(data["loss_scale"])),
             {one["name"]: (float(one["mean"]), float(one["deviation"])) for one in data["priors"]},
+            asked_in(data),
+            data,
         )
         finite = np.all(np.isfinite(errors.covariance)) and np.all(np.isfinite(kept.x))
     except (KeyError, TypeError, ValueError, IndexError, RideError) as error:

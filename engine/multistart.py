@@ -29,6 +29,19 @@ SAME_VALUES = 1e-3
 so already."""
 
 
+SEARCH_OF_START = 1.75
+"""Single fits that the search from another start is worth, most of it on the way to a basin, ..."""
+
+SIMULATIONS = 250
+"""... and simulations of a single fit (docs/identification.md, Many starts)."""
+
+
+def fits_of(starts: int) -> float:
+    """How many single fits so many starts are worth: one simulation each, and their searches."""
+    others = starts - 1
+    return 1.0 + SEARCH_OF_START * min(others, REFINED - 1) + others / SIMULATIONS
+
+
 def spread(lower: Array, upper: Array, count: int, seed: int) -> list[Array]:
     """`count` points between the bounds, of a Sobol sequence scrambled by `seed`."""
     if count < 1:

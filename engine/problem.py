@@ -168,10 +168,25 @@ class Problem:
         """The part of x that is the car's."""
         return x[: len(self.free)]
 
-    def started_at(self, values: Mapping[str, float]) -> "Problem":
-        """The same problem from other start values, by name, of the free parameters."""
-        free = tuple(replace(one, start=values[one.name]) for one in self.free)
-        return replace(self, vehicle=self.vehicle.with_values(values), free=free)
+    def as_fitted(self, fit: Mapping[str, Any]) -> "Problem":
+        """The same problem from where a fit of it ended, given as JSON, and with its noise."""
+        values = {one["name"]: one["value"] for one in fit["parameters"]}
+        of_sensors = {(one["name"], one["run"]): one["value"] for one in fit.get("sensors", ())}
+        noise = {
+            (run["name"], channel): run["noise"][channel]
+            for run in fit["runs"]
+            for channel, source in run.get("noise_source", {}).items()
+            if source == "fitted"
+        }
+        return replace(
+            self.with_noise(noise),
+            vehicle=self.vehicle.with_values(values),
+            free=tuple(replace(one, start=values[one.name]) for one in self.free),
+            fitted=tuple(
+                replace(one, start=of_sensors.get((one.name, one.run), one.start))
+                for one in self.fitted
+            ),
+        )
 
     def values(self, x: Array) -> Array:
         """The free parameters at the optimiser's variables x."""

@@ -40,8 +40,7 @@ from .filters import in_band
 from .kernels.lanes import BATCH
 from .problem import Problem
 from .rims import RimsInputs
-from .sensing import IDEAL, delayed, driven, sensed
-from .sensor_model import SensorVariable
+from .sensing import IDEAL, driven, reading_slope, sensed
 from .simulation import Traction, fit_percent
 from .stability import check_rims_step
 from .uncertainty import Information, RunResiduals
@@ -305,18 +304,10 @@ class Residuals:
             for block in self.blocks():
                 if block.channel == one.channel and one.run in (None, block.run) and histories:
                     model = histories[block.run][:, OUTPUT_CHANNELS.index(block.channel)]
-                    change = self._filtered(block.time, self._change(one, block, model, x))
-                    columns[block.place, k] = slope * change / block.noise
-
-    def _change(self, one: SensorVariable, block: Block, model: Array, x: Array) -> Array:
-        """d reading / d quantity (samples,) of a model's history."""
-        if one.quantity == "bias":
-            return np.ones_like(model)
-        reading = self.problem.reading(x, block.channel, block.run)
-        late, rates = delayed(block.time, model, reading.delay)
-        if one.quantity == "delay":
-            return -reading.gain * rates
-        return late * np.copysign(1.0, reading.gain)
+                    reading = self.problem.reading(x, block.channel, block.run)
+                    change = reading_slope(block.time, model, reading, one.quantity)
+                    filtered = self._filtered(block.time, change)
+                    columns[block.place, k] = slope * filtered / block.noise
 
     def _batch(self, trials: Sequence[Array]) -> tuple[Array, Histories]:
         """Residuals of many cars, (cars, samples of all blocks), and the model's histories of the
@@ -366,12 +357,12 @@ class Residuals:
 
     def _read(self, block: Block, model: Array, trials: Sequence[Array]) -> Array:
         """What the sensors of many cars read of a channel (cars, samples), filtered."""
-        fine = np.isfinite(model).all(axis=1)
-        histories = np.where(fine[:, np.newaxis], model, 0.0)
+        fine = np.isfinite(model).all(axis=1, keepdims=True)
+        histories = np.where(fine, model, 0.0)
         if block.channel in self.problem.sensors:
             readings = [self.problem.reading(x, block.channel, block.run) for x in trials]
             histories = sensed(block.time, histories, readings)
-        return np.where(fine[:, np.newaxis], self._filtered(block.time, histories), np.nan)
+        return np.where(fine, self._filtered(block.time, histories), np.nan)
 
     def _histories(self, cars: Array, inputs: Sequence[RimsInputs]) -> Histories:
         """By run (cars, samples, 3); the runs side by side, looking at `cancelled`."""

@@ -64,6 +64,16 @@ def sensed(time: Array, histories: Array, readings: Sequence[Reading]) -> Array:
     return gains[:, np.newaxis] * late + biases[:, np.newaxis]
 
 
+def reading_slope(time: Array, history: Array, reading: Reading, quantity: str) -> Array:
+    """d reading / d quantity (samples,) of a model's history: of its "gain", "bias" or "delay"."""
+    if quantity == "bias":
+        return np.ones_like(history)
+    late, rates = delayed(time, history, reading.delay)
+    if quantity == "delay":
+        return -reading.gain * rates
+    return late * np.copysign(1.0, reading.gain)
+
+
 def where_driven(run: Run, readings: Mapping[str, Reading]) -> Run:
     """The part of a record at whose every sample each of the delayed inputs was read.
 

@@ -163,6 +163,16 @@ def sensor_model(
     return SensorModel(fixed, fitted)
 
 
+def asked_in(fit: Mapping[str, Any]) -> dict[str, dict[str, float | str]]:
+    """What a fit, as JSON, was asked of the sensors, but for the noise that it found."""
+    asked: dict[str, dict[str, float | str]] = {
+        name: dict(one) for name, one in fit.get("fixed_sensors", {}).items()
+    }
+    for one in fit.get("sensors", ()):
+        asked.setdefault(one["channel"], {})[one["quantity"]] = FIT
+    return asked
+
+
 def readings_in(fit: Mapping[str, Any], run: str | None) -> dict[str, Reading]:
     """The sensors that a fit, as JSON, knows for one of its runs, or for another one (None), of
     whose biases it knows nothing; none where it is from before there were sensors.

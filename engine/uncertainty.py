@@ -109,6 +109,18 @@ class Information:
             self.freedom + other.freedom,
         )
 
+    def marginal(self, first: int) -> "Information":
+        """What they say of the first variables, whatever the others are: J^T J becomes its Schur
+        complement S, and M what gives the same covariance, S C S.
+        """
+        count = len(self.root)
+        others_first = [*range(first, count), *range(first)]
+        root = triangle(self.root[:, others_first])[count - first :, count - first :]
+        bread = bread_of(self.root)[0]
+        covariance = (bread @ self.scatter @ bread)[:first, :first]
+        schur = root.T @ root
+        return Information(root, schur @ covariance @ schur, self.samples, self.freedom)
+
 
 @dataclass(frozen=True, slots=True)
 class Uncertainty:

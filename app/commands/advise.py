@@ -82,7 +82,8 @@ def _problem(options: Namespace, noise: Mapping[str, float]) -> Problem:
         settings=fit.settings,
         loss=fit.loss,
         priors=fit.priors,
-    )
+        sensors=fit.sensors,
+    ).as_fitted(fit.ended)
 
 
 def _is_json(name: str) -> bool:

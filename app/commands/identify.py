@@ -39,12 +39,12 @@ def identify(options: Namespace) -> None:
     require_free(problem, profiled)
     fit = fitted(options, problem)
     print_fit(fit)
-    solved = problem.started_at({one.name: one.value for one in fit.parameters})
-    solved = solved.with_noise(fit.found_noise)
+    found = fit_to_json(fit)
+    solved = problem.as_fitted(found)
     profiles = [profile(solved, name) for name in profiled]
     _print_profiles(profiles)
     if options.output:
-        told = {**fit_to_json(fit), "profiles": [profile_to_json(one) for one in profiles]}
+        told = {**found, "profiles": [profile_to_json(one) for one in profiles]}
         write_file(options.output, json.dumps(told, indent=2) + "\n")
 
 

@@ -3,12 +3,19 @@
 import json
 import os
 import signal
+from dataclasses import replace
+from types import SimpleNamespace
 
 import httpx2
 import psutil
 import pytest
+from ridetune.app.errors import OverBudget
+from ridetune.app.identification_job import as_asked, check_budget
+from ridetune.app.jobs import digest
 from ridetune.app.schemas import IdentificationRequest
-from ridetune.app.settings import Settings
+from ridetune.app.settings import Limits, Settings
+from ridetune.engine.measurement import read_run, run_to_csv
+from ridetune.engine.multistart import fits_of
 from ridetune.engine.parameters import PARAMETER_NAMES
 from ridetune.engine.vehicle_file import read_vehicle, vehicle_to_json
 
@@ -90,6 +97,11 @@ def test_what_a_job_shows_repeats_its_fit(engineer):
         "loss": "cauchy",
         "loss_scale": 5.0,
         "priors": {"phi_F": [0.07, 0.05]},
+        "sensors": {
+            "chassis.pitch": {"delay": 0.005, "gain": "fit"},
+            "chassis.a_x": {"bias": "fit"},
+        },
+        "fit_noise": True,
     }
     first = engineer.post("/identifications", json=asked).json()["id"]
     first = engineer.wait_for("identifications", first)
@@ -107,15 +119,75 @@ def test_what_a_job_shows_repeats_its_fit(engineer):
     differ = {name for name in first["result"] if first["result"][name] != again["result"][name]}
     assert differ <= {"seconds"}
     assert first["free"] == again["free"] == [REAR, "front.pivot.angle"]
+    assert first["sensors"] == again["sensors"] == asked["sensors"]
+    assert [(one["name"], one["run"]) for one in first["result"]["sensors"]] == [
+        ("sensor.chassis.pitch.gain", None),
+        ("sensor.chassis.a_x.bias", first["runs"][0]["name"]),
+    ]
+    assert first["result"]["fixed_sensors"] == {"chassis.pitch": {"delay": 0.005}}
     assert first["priors"] == {"front.pivot.angle": [0.07, 0.05]}
     assert first["progress"]["searches"] == first["result"]["starts"] == 3
     assert sum(one["starts"] for one in first["result"]["minima"]) == 3
+
+
+def test_a_turned_channel_is_mended_by_sending_what_is_offered(engineer):
+    """Oracle: the twin's own car; four standard errors."""
+    truth = read_vehicle(SAMPLES / "twin/vehicle.json")
+    run = read_run(SAMPLES / "twin/manoeuvre_2.csv")
+    turned = {**run.channels, "chassis.roll": -run["chassis.roll"]}
+    content = run_to_csv(replace(run, channels=turned)).encode()
+    kept = engineer.upload(content, "turned.csv").json()["id"]
+    names = ["front.suspension.stiffness", "rear.suspension.damping"]
+    asked = {"vehicle": vehicle_to_json(truth), "runs": [kept], "free": names}
+
+    def fit(more):
+        job = engineer.post("/identifications", json={**asked, **more}).json()["id"]
+        return engineer.wait_for("identifications", job)["result"]
+
+    [offer] = fit({})["offers"]
+    assert offer["channel"] == "chassis.roll"
+    assert "sign" in offer["sentence"]
+    mended = fit({"sensors": {offer["channel"]: offer["sensor"]}})
+    assert mended["offers"] == []
+    for found in mended["parameters"]:
+        assert abs(found["value"] - truth.value(found["name"])) < 4.0 * found["std_error"]
+
+
+def test_requests_without_sensors_stand_for_what_they_did_before_there_were_any():
+    """Oracle: the digest of the same form without the fields."""
+    request = IdentificationRequest(runs=["a"])
+    form = request.model_dump(mode="json", exclude={"key", "sensors", "fit_noise"})
+    for given in ("bounds", "start", "priors"):
+        form[given] = []
+    assert as_asked(request) == digest(form)
+    other = IdentificationRequest(runs=["a"], sensors={"chassis.z": {"sign": -1}})
+    assert as_asked(other) != as_asked(request)
+
+
+def test_the_budget_counts_starts_and_rounds_of_noise():
+    """Oracle: what the study of many starts measured: 64 starts are worth 12 to 14 single fits;
+    noise takes two more."""
+    kept = SimpleNamespace(summary={"samples": 4001, "duration": 20.0})
+    limits = Limits(identified_samples=13 * 4001)
+    check_budget([kept], 0.005, limits, starts=50)
+    for more in ({"starts": 128}, {"starts": 64, "fit_noise": True}):
+        with pytest.raises(OverBudget, match="choose fewer starts"):
+            check_budget([kept], 0.005, limits, **more)
+    assert 12.0 < fits_of(64) < 14.0
+    check_budget([kept], 0.005, Limits(identified_samples=3 * 4001), fit_noise=True)
+    with pytest.raises(OverBudget, match="choose noise that is stated, fewer or shorter runs"):
+        check_budget([kept], 0.005, Limits(identified_samples=2 * 4001), fit_noise=True)
 
 
 def test_what_a_search_cannot_be_asked_is_refused(engineer):
     run = engineer.get("/measurements").json()[0]["id"]
     for asked, sentence in (
         ({"starts": 2000}, "less than or equal to 1024"),
+        ({"sensors": {"chasis.z": {"gain": 1}}}, "did you mean chassis.z?"),
+        ({"sensors": {"chassis.z": {"gian": 1}}}, "did you mean gain?"),
+        ({"sensors": {"chassis.z": {"gain": "x"}}}, 'give a number or \\"fit\\"'),
+        ({"sensors": {"chassis.z": 1}}, "sensors.chassis.z is refused"),
+        ({"fit_noise": 1}, "fit_noise is refused"),
         ({"loss": "hubert"}, "'linear', 'soft_l1', 'huber'"),
         ({"loss_scale": 0}, "greater than or equal to 0.01"),
         ({"priors": {"K_R": [1e3, 1.0]}}, "lies outside its bounds"),
