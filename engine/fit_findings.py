@@ -12,8 +12,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from .compared_runs import ComparedRun
 from .fit import FittedRun, Minimum, ParameterEstimate, SensorEstimate
-from .problem import ComparedRun, Problem
+from .problem import Problem
 from .simulation import fit_percent
 from .spikes import despiked
 from .uncertainty import Uncertainty

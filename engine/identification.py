@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.stats.qmc import Halton
 
 from .channels import WHEEL_CHANNELS
+from .compared_runs import ComparedRun
 from .errors import ProblemError
 from .fit import (
     CONVERGED,
@@ -45,7 +46,7 @@ from .initial_state import swings_in
 from .multistart import refined_starts, spread
 from .noise_rounds import with_found_noise
 from .prior_checks import disagreements, prior_checks
-from .problem import ComparedRun, FreeParameter, Problem
+from .problem import FreeParameter, Problem
 from .residuals import FAILED_TRIAL, Residuals, Simulate
 from .search import Found, Search
 from .search_settings import MOST_STARTS

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .problem import SENSORS_BEST
+from .compared_runs import SENSORS_BEST
 from .residuals import FAILED_TRIAL, Residuals
 from .run_notes import DEFAULT_NOISE
 from .search import Found, Search

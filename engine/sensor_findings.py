@@ -5,9 +5,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from .channels import INPUT_CHANNELS
+from .compared_runs import ComparedRun
 from .fit import DELAY_MATTERS, Offer, SensorEstimate, determined
 from .fit_findings import ChannelFaults
-from .problem import ComparedRun, Problem
+from .problem import Problem
 from .sensing import A_X
 from .sensor_model import LARGEST_GAIN, SMALLEST_GAIN, SensorModel, SensorVariable
 

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from .channels import OUTPUT_CHANNELS, Run
+from .compared_runs import distinct_names, same_data
 from .errors import Cancelled, ManoeuvreError, ProblemError, RideError, VehicleError
 from .json_record import RecordReader
 from .manoeuvre import Manoeuvre
 from .measurement import missing_for_identification
 from .metrics import pushes
-from .problem import distinct_names, same_data
 from .rating import Rating, rate
 from .rims import filtered_outputs
 from .rims_settings import RimsSettings

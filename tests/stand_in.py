@@ -11,7 +11,7 @@ from ridetune.engine.channels import INPUT_CHANNELS, OUTPUT_CHANNELS, Run
 from ridetune.engine.kernels.buffer import BODY_ROWS
 from ridetune.engine.kernels.records import Body, Corner
 from ridetune.engine.parameters import PARAMETER_NAMES
-from ridetune.engine.problem import DEFAULT_NOISE
+from ridetune.engine.run_notes import DEFAULT_NOISE
 
 from .factories import paper_vehicle
 

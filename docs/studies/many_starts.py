@@ -11,7 +11,7 @@ import time
 
 from ridetune.engine.campaign import drive_table_2
 from ridetune.engine.identification import Problem, identify
-from ridetune.engine.problem import DEFAULT_NOISE
+from ridetune.engine.run_notes import DEFAULT_NOISE
 from ridetune.engine.vehicle_file import reference_vehicles
 
 STARTS = 64

@@ -14,7 +14,7 @@ from ridetune.engine.campaign import drive_table_2
 from ridetune.engine.errors import ProblemError
 from ridetune.engine.identification import Problem, identify
 from ridetune.engine.parameters import PARAMETERS, default_bounds
-from ridetune.engine.problem import DEFAULT_NOISE
+from ridetune.engine.run_notes import DEFAULT_NOISE
 from ridetune.engine.vehicle_file import reference_vehicles
 
 STARTS = 80

@@ -168,9 +168,9 @@ def test_the_budget_counts_starts_and_rounds_of_noise():
     """Oracle: what the study of many starts measured: 64 starts are worth 12 to 14 single fits;
     noise takes two more."""
     kept = SimpleNamespace(summary={"samples": 4001, "duration": 20.0})
-    limits = Limits(identified_samples=13 * 4001)
-    check_budget([kept], 0.005, limits, starts=50)
-    for more in ({"starts": 128}, {"starts": 64, "fit_noise": True}):
+    limits = Limits(identified_samples=14 * 4001)
+    check_budget([kept], 0.005, limits, starts=64)
+    for more in ({"starts": 256}, {"starts": 64, "fit_noise": True}):
         with pytest.raises(OverBudget, match="choose fewer starts"):
             check_budget([kept], 0.005, limits, **more)
     assert 12.0 < fits_of(64) < 14.0

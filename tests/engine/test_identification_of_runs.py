@@ -13,9 +13,9 @@ from ridetune.engine.identification import Problem, identify
 from ridetune.engine.manoeuvre import read_manoeuvre
 from ridetune.engine.measurement import read_run
 from ridetune.engine.parameters import ALL_NAMES, DAMPER_NAMES, PARAMETER_NAMES, PARAMETERS
-from ridetune.engine.problem import DEFAULT_NOISE
 from ridetune.engine.residuals import Residuals
 from ridetune.engine.rims_settings import RimsSettings
+from ridetune.engine.run_notes import DEFAULT_NOISE
 from ridetune.engine.simulation import rims_batch, simulate_rims
 from ridetune.engine.uncertainty import information, uncertainty
 from ridetune.engine.validation import Case, validate

@@ -7,8 +7,8 @@ from ridetune.engine.identification import Problem, identify
 from ridetune.engine.initial_state import swings_in
 from ridetune.engine.manoeuvre import reference_manoeuvres
 from ridetune.engine.parameters import PARAMETER_NAMES
-from ridetune.engine.problem import DEFAULT_NOISE
 from ridetune.engine.rims_settings import RimsSettings
+from ridetune.engine.run_notes import DEFAULT_NOISE
 from ridetune.engine.simulation import simulate_rims, simulate_road
 
 from ..factories import paper_vehicle

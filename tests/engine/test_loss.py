@@ -10,8 +10,8 @@ from ridetune.engine.errors import ProblemError
 from ridetune.engine.identification import Problem, identify
 from ridetune.engine.loss import Loss
 from ridetune.engine.parameters import PARAMETER_NAMES
-from ridetune.engine.problem import DEFAULT_NOISE
 from ridetune.engine.residuals import Residuals
+from ridetune.engine.run_notes import DEFAULT_NOISE
 from ridetune.engine.search_settings import LossName
 from scipy.optimize import least_squares
 

@@ -7,8 +7,9 @@ from ridetune.engine.channels import INPUT_CHANNELS, OUTPUT_CHANNELS, Run
 from ridetune.engine.errors import MeasurementError, ParameterError, ProblemError
 from ridetune.engine.filters import low_pass
 from ridetune.engine.parameters import PARAMETER_NAMES
-from ridetune.engine.problem import DEFAULT_NOISE, FreeParameter, Problem
+from ridetune.engine.problem import FreeParameter, Problem
 from ridetune.engine.rims_settings import RimsSettings
+from ridetune.engine.run_notes import DEFAULT_NOISE
 
 from ..factories import paper_vehicle
 

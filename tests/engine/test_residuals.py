@@ -7,9 +7,10 @@ from ridetune.engine.channels import OUTPUT_CHANNELS
 from ridetune.engine.errors import Cancelled
 from ridetune.engine.filters import low_pass
 from ridetune.engine.parameters import PARAMETER_NAMES
-from ridetune.engine.problem import DEFAULT_NOISE, Problem
+from ridetune.engine.problem import Problem
 from ridetune.engine.residuals import FAILED_TRIAL, Residuals
 from ridetune.engine.rims_settings import RimsSettings
+from ridetune.engine.run_notes import DEFAULT_NOISE
 
 from .. import stand_in
 

@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from ridetune.engine.campaign import drive_table_2
 from ridetune.engine.channels import INPUT_CHANNELS, OUTPUT_CHANNELS
+from ridetune.engine.condensed import triangle
 from ridetune.engine.errors import ProblemError
 from ridetune.engine.fit import Outcome
 from ridetune.engine.fit_file import fit_to_json
@@ -21,7 +22,7 @@ from ridetune.engine.run_notes import DEFAULT_NOISE
 from ridetune.engine.sensing import Reading, corrected, driven
 from ridetune.engine.sensors import Sensor, SensorSet, measured
 from ridetune.engine.simulation import rims_batch
-from ridetune.engine.uncertainty import Uncertainty
+from ridetune.engine.uncertainty import Information, Uncertainty, uncertainty
 
 from .. import stand_in
 from ..factories import paper_vehicle
@@ -258,6 +259,17 @@ def test_the_marginal_of_unknown_directions_is_what_they_move_of_the_first():
     assert_allclose(first.std_error, [np.inf, 2.0])
     assert_allclose(np.abs(first.unknown), [[1.0, 0.0]], atol=1e-12)
     assert_allclose(first.covariance, [[0.0, 0.0], [0.0, 4.0]], atol=1e-12)
+
+
+def test_marginal_information_gives_the_marginal_errors():
+    """Oracle: the errors of all five variables, of which the first two are taken."""
+    rng = np.random.default_rng(0)
+    slopes, scores = rng.normal(size=(40, 5)), rng.normal(size=(40, 5))
+    whole = Information(triangle(slopes), scores.T @ scores, 40.0, 30.0)
+    part, errors = uncertainty(whole.marginal(2)), uncertainty(whole).marginal(2)
+    assert_allclose(part.covariance, errors.covariance, rtol=1e-10)
+    schur = np.linalg.inv(np.linalg.inv(slopes.T @ slopes)[:2, :2])
+    assert_allclose(whole.marginal(2).root.T @ whole.marginal(2).root, schur, rtol=1e-10)
 
 
 def test_a_turned_channel_is_offered_its_sign_and_then_fits_as_if_it_were_not(true):
