@@ -171,7 +171,7 @@ def identify(
     if converged:
         warnings += undetermined_findings([*estimates, *sensors], of_all)
     return Fit(
-        verdict=verdict(estimates, errors, problem.of_car(solution.x), problem.vehicle_at)
+        verdict=verdict(estimates, errors, problem.vehicle_at(solution.x))
         if converged
         else without_verdict(estimates),
         vehicle=problem.vehicle_at(solution.x),

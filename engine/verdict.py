@@ -12,7 +12,7 @@ PART_OF_APART of what these errors would give were they independent, sqrt(sum (g
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,19 +43,16 @@ ORDER = ("yes", "weakly", "no")
 
 
 def verdict(
-    estimates: Sequence[ParameterEstimate],
-    errors: Uncertainty,
-    x: Array,
-    vehicle_at: Callable[[Array], Vehicle],
+    estimates: Sequence[ParameterEstimate], errors: Uncertainty, vehicle: Vehicle
 ) -> Verdict:
     """The verdict on a fit that converged.
 
-    x : (n,) the search's variables at the solution;  vehicle_at : the car at any x
+    errors : of the search's variables;  vehicle : at the solution
     """
     classes = by_class(estimates)
     names = [one.name for one in estimates]
     gradients = {
-        one.name: _gradient(one, names, x, vehicle_at)
+        one.name: _gradient(one, estimates, vehicle)
         for one in COMBINATIONS
         if sum(name in names for name in one.of) > 1
     }
@@ -63,7 +60,7 @@ def verdict(
         estimate
         for one in COMBINATIONS
         if one.name in gradients
-        and (estimate := _held_together(one, gradients[one.name], estimates, errors, vehicle_at(x)))
+        and (estimate := _held_together(one, gradients[one.name], estimates, errors, vehicle))
     ]
     return Verdict(
         parameters=classes,
@@ -86,20 +83,24 @@ def by_class(estimates: Sequence[ParameterEstimate]) -> dict[str, tuple[str, ...
     return {word: tuple(one.name for one in estimates if one.determined == word) for word in ORDER}
 
 
-def _gradient(
-    one: Combination, names: Sequence[str], x: Array, vehicle_at: Callable[[Array], Vehicle]
-) -> Array:
+def _gradient(one: Combination, estimates: Sequence[ParameterEstimate], vehicle: Vehicle) -> Array:
     """dq/dx, (n,); d ln q/dx of a quantity that is never negative, 0 where it is 0."""
-    gradient = np.zeros(len(x))
-    for k in (names.index(name) for name in one.of if name in names):
-        step = STEP * np.eye(len(x))[k]
-        ahead, behind = (one.value(vehicle_at(x + way * step)) for way in (1.0, -1.0))
-        if not one.signed and min(ahead, behind) <= 0.0:
-            return np.zeros(len(x))
-        if not one.signed:
-            ahead, behind = math.log(ahead), math.log(behind)
-        gradient[k] = (ahead - behind) / (2.0 * STEP)
+    if not one.signed and one.value(vehicle) <= 0.0:
+        return np.zeros(len(estimates))
+    gradient = np.zeros(len(estimates))
+    for k, of in enumerate(estimates):
+        if of.name in one.of:
+            ends = [_moved(one, of, vehicle, way * STEP) for way in (1.0, -1.0)]
+            gradient[k] = (ends[0] - ends[1]) / (2.0 * STEP)
     return gradient
+
+
+def _moved(one: Combination, of: ParameterEstimate, vehicle: Vehicle, change: float) -> float:
+    """q, or its logarithm, with a parameter's variable changed by so much, bounds aside."""
+    free = of.free
+    value = of.value * math.exp(change) if free.logarithmic else of.value + change * free.scale
+    moved = one.value(vehicle.varied({of.name: np.array(value)}))
+    return float(moved if one.signed else np.log(moved))
 
 
 def _held_together(
@@ -111,7 +112,7 @@ def _held_together(
 ) -> CombinationEstimate | None:
     """The combination, if the runs hold it better than what it is made of."""
     members = [k for k, of in enumerate(estimates) if of.name in one.of]
-    if any(estimates[k].at_bound for k in members) or not np.any(gradient):
+    if not np.any(gradient):
         return None
     estimate = _estimate(one, gradient, errors, vehicle)
     apart = float(np.linalg.norm(gradient[members] * errors.std_error[members]))
@@ -155,7 +156,7 @@ def _directions(
     found = [(math.inf, row) for row in errors.unknown]
     found += [(float(lengths[k]), axes[:, k]) for k in known]
     return [
-        Direction(length, _parts(names, axis), _moved(axis, gradients)) for length, axis in found
+        Direction(length, _parts(names, axis), _along(axis, gradients)) for length, axis in found
     ]
 
 
@@ -166,7 +167,7 @@ def _parts(names: Sequence[str], axis: Array) -> dict[str, float]:
     return {names[k]: sign * float(axis[k]) for k in order if abs(float(axis[k])) >= LOUD}
 
 
-def _moved(axis: Array, gradients: Mapping[str, Array]) -> str | None:
+def _along(axis: Array, gradients: Mapping[str, Array]) -> str | None:
     """Name of the combination whose gradient lies along an axis."""
     along = {
         name: abs(float(axis @ gradient)) / float(np.linalg.norm(gradient))

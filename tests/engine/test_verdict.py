@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from ridetune.engine.combinations import COMBINATIONS
 from ridetune.engine.fit import ParameterEstimate
+from ridetune.engine.parameters import default_bounds
 from ridetune.engine.uncertainty import Uncertainty
 from ridetune.engine.verdict import by_class, verdict, without_verdict
 
@@ -15,23 +16,18 @@ NAMES = (BAR, DISTANCE)
 NAMED = {one.name: one for one in COMBINATIONS}
 
 
-def judged(covariance, unknown=(), words=("weakly", "weakly"), names=NAMES):
+def judged(covariance, unknown=(), words=("weakly", "weakly"), names=NAMES, at_bound=False):
     """The verdict on parameters with some covariance of their logarithms."""
     n = len(names)
     errors = Uncertainty(
         np.array(covariance), np.array(unknown).reshape(-1, n), quantile=2.0, alone=np.zeros(n)
     )
     estimates = [
-        ParameterEstimate(name, CAR.value(name), "", 0.0, (0, 0), 1.0, 1e-9, 1e9, False, word)
+        ParameterEstimate(name, CAR.value(name), "", 0.0, (0, 0), 1.0, *bounds, at_bound, word)
         for name, word in zip(names, words, strict=True)
+        for bounds in [default_bounds(name, 1.0)]
     ]
-
-    def vehicle_at(x):
-        return CAR.with_values(
-            {name: CAR.value(name) * math.exp(v) for name, v in zip(names, x, strict=True)}
-        )
-
-    return verdict(estimates, errors, np.zeros(n), vehicle_at)
+    return verdict(estimates, errors, CAR)
 
 
 def along(*directions):
@@ -68,6 +64,13 @@ def test_a_direction_that_no_run_moves_leaves_the_rate_known():
     assert second.combination == "front.bar_rate"
 
 
+def test_a_parameter_at_its_bound_may_be_known_together_with_another():
+    """Oracle: as above; beyond the bound the other would follow, and leave their rate as it is."""
+    covariance = along((0.05, (2, 1)), (1e-4 / 5, (1, -2)))
+    found = judged(covariance, words=("no", "weakly"), at_bound=True)
+    assert "front.bar_rate" in [one.name for one in found.combinations]
+
+
 def test_independent_parameters_are_not_told_together():
     """Oracle: uncorrelated, the rate is as uncertain as its parts make it."""
     assert not judged(np.diag([0.02, 0.02])).combinations
@@ -79,10 +82,10 @@ def test_well_known_parameters_need_no_combination():
 
 
 def test_the_traction_slope_s_error_is_absolute():
-    """Oracle: d(tan phi - r/d) = phi / cos^2 phi dln(phi) + r/d dln(d) for logarithms of both."""
+    """Oracle: d(tan phi - r/d) = s / cos^2 phi dx + r/d dln(d), x = phi/s with s the start, 1."""
     pivot, radius = CAR.front.pivot, CAR.front.wheel.radius
     gradient = np.array(
-        [radius / pivot.distance, pivot.angle / math.cos(pivot.angle) ** 2],
+        [radius / pivot.distance, 1.0 / math.cos(pivot.angle) ** 2],
     )
     across = np.array([gradient[1], -gradient[0]])
     covariance = along((0.05, across), (1e-6 / (gradient @ gradient), gradient))
