@@ -114,6 +114,8 @@ export const saveVehicle = (vehicle) =>
 export const saveBaseline = (vehicle) => json("PUT", `${base}/baseline`, { body: vehicle });
 export const simulate = (body) =>
   frames("POST", `${base}/simulations`, { body, accept: FRAMES });
+/** Which manoeuvre to drive next, for {identification}. */
+export const advise = (body) => json("POST", `${base}/advice`, { body });
 export async function simulateFile(body) {
   return (await call("POST", `${base}/simulations`, { body, accept: "text/csv" })).blob();
 }
@@ -136,7 +138,7 @@ export function measurement(id, channelNames, maxSamples, decimate = "stride") {
   return frames("GET", `${base}/measurements/${id}/frames?${query}`, { accept: FRAMES });
 }
 
-// Jobs of a kind: "identifications", "validations" or "campaigns"
+// Jobs of a kind: "identifications", "profiles", "validations" or "campaigns"
 export const submit = (kind, body) => json("POST", `${base}/${kind}`, { body });
 export const jobs = (kind) => json("GET", `${base}/${kind}`);
 export const job = (kind, id) => json("GET", `${base}/${kind}/${id}`);

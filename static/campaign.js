@@ -26,7 +26,18 @@ export function build() {
   parts.outcome = h("div", { className: "campaign-outcome" });
   const fields = form.build({ onChange: showTools, onSubmit: start, tools: parts.tools });
   on("measurements", show);
-  return fold(memory, h("summary", {}, "Drive a campaign with virtual sensors"), fields, parts.outcome);
+  parts.fold = fold(memory, h("summary", {}, "Drive a campaign with virtual sensors"), fields, parts.outcome);
+  return parts.fold;
+}
+
+/** Unfold the form with one manoeuvre chosen in it. */
+export function propose(key) {
+  problem = "";
+  memory.open = parts.fold.open = true;
+  form.choose(key);
+  show();
+  parts.fold.scrollIntoView({ block: "nearest" });
+  parts.drive?.focus();
 }
 
 function start() {

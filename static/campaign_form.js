@@ -3,7 +3,7 @@
 import * as api from "./api.js";
 import { withValues } from "./controls.js";
 import { fold, h, inPlace } from "./dom.js";
-import { get, set } from "./store.js";
+import { get, on, set } from "./store.js";
 import * as units from "./units.js";
 
 /** Chosen until somebody chooses: the paper's manoeuvres. */
@@ -29,8 +29,9 @@ export function build({ onChange, onSubmit, tools }) {
   parts.noise = h("p", { className: "hint" });
   parts.sensors = h("div", { className: "campaign-sensors" });
   parts.more = h("summary");
-  parts.manoeuvres = h("fieldset", { className: "campaign-manoeuvres" }, h("legend", {}, "Manoeuvres"),
-    get("manoeuvres").filter(({ kind }) => kind === "road").map(manoeuvre));
+  parts.manoeuvres = h("fieldset", { className: "campaign-manoeuvres" });
+  list(USUAL);
+  on("manoeuvres", () => list(chosen()));
   const form = h("form", { className: "campaign", "aria-label": "Drive a campaign",
     on: { submit: (event) => { event.preventDefault(); onSubmit(); }, change: follow } },
   parts.manoeuvres,
@@ -53,6 +54,19 @@ export function build({ onChange, onSubmit, tools }) {
   return form;
 }
 
+/** What can be driven, with these keys chosen. */
+function list(keys) {
+  parts.manoeuvres.replaceChildren(h("legend", {}, "Manoeuvres"),
+    ...get("manoeuvres").filter(({ kind }) => kind === "road").map((one) => manoeuvre(one, keys)));
+}
+
+/** Choose one manoeuvre, and no other. */
+export function choose(key) {
+  list([key]);
+  follow();
+  parts.manoeuvres.querySelector("input:checked")?.scrollIntoView({ block: "nearest" });
+}
+
 function more() {
   const low = number("band_low", "Roads from, cycle/m", { min: "0", step: "any", placeholder: "as it is" },
     "Lowest spatial frequency of every random road, cycle/m; empty: as the manoeuvre has it");
@@ -67,8 +81,8 @@ function more() {
     missing("formats"), parts.sensors);
 }
 
-function manoeuvre({ key, name, duration }) {
-  const box = h("input", { type: "checkbox", value: key, checked: USUAL.includes(key) });
+function manoeuvre({ key, name, duration }, keys) {
+  const box = h("input", { type: "checkbox", value: key, checked: keys.includes(key) });
   return h("label", { title: name }, box, h("span", { className: "name" }, name),
     h("span", { className: "soft" }, `${units.plain(duration, 3)} s`));
 }
@@ -103,6 +117,14 @@ function noiseSaid() {
 }
 
 const chosen = () => [...parts.manoeuvres.querySelectorAll("input:checked")].map(({ value }) => value);
+/** Keys of known manoeuvres; by the recordings' names where one is given as an object. */
+function driven() {
+  const rows = get("manoeuvres").filter(({ key }) => chosen().includes(key));
+  return rows.some(({ given }) => given)
+    ? Object.fromEntries(rows.map(({ key, given }) => [key.replace(/[^\w-]/g, "_"), given ?? key]))
+    : rows.map(({ key }) => key);
+}
+
 const plant = () => get("plants").find(({ key }) => key === fields.plant.value);
 const typed = (key) => (fields[key].value === "" ? null : Number(fields[key].value));
 
@@ -115,7 +137,7 @@ function band() {
 export const request = () => ({
   plant: plant().key,
   vehicle: plant().takes_vehicle ? withValues(get("vehicle"), get("values")) : null,
-  manoeuvres: chosen(),
+  manoeuvres: driven(),
   class_factor: typed("class_factor"),
   band: band(),
   road_seed: typed("road_seed"),

@@ -4,6 +4,7 @@
 // lie the baseline (a tick) and, after a fit, the 95 % interval of the identified value (a band).
 
 import { $, capital, h, symbol } from "./dom.js";
+import { isKnown, span } from "./intervals.js";
 import { notice } from "./notices.js";
 import { get, on, set } from "./store.js";
 import * as units from "./units.js";
@@ -18,9 +19,6 @@ export const DETERMINED = {
 const rows = new Map();
 /** The number that was typed last, until a car with it has been simulated: {parameter, before}. */
 let entered = null;
-
-/** An interval may be unbounded: the run says nothing about the parameter. */
-export const isBounded = (interval) => Boolean(interval?.every(Number.isFinite));
 
 export const valueAt = (vehicle, path) => path.split(".").reduce((part, key) => part[key], vehicle);
 
@@ -62,6 +60,15 @@ export function straightened(vehicle) {
     delete copy[side].suspension.knee_speed;
   }
   return copy;
+}
+
+/** Whether a fit was made with the known data of the sliders' car: its errors suit no other. */
+export function isOfThisCar(fit) {
+  if (!fit) return false;
+  const now = get("vehicle");
+  const known = (car) => JSON.stringify(
+    { ...straightened(withValues(car, valuesOf(now))), name: "", source: "" });
+  return known(fit.vehicle) === known(now);
 }
 
 /** Give the sliders' car dampers with two slopes and a knee, or linear ones. */
@@ -112,8 +119,10 @@ export function build({ onBaseline }) {
     h("p", { className: "track-legend", id: "interval-legend", hidden: true },
       Object.entries(DETERMINED).map(([verdict, text]) =>
         h("span", { className: `mark-interval ${verdict}` }, text.replace(" determined", "")))),
+    h("p", { className: "track-legend", id: "outside-legend", hidden: true },
+      h("span", { className: "mark-outside" }, "number beyond its slider")),
   );
-  on("values baseline fit", show);
+  on("values baseline fit vehicle", show);
   on("now trouble", judge);
   show();
 }
@@ -261,8 +270,10 @@ function nudge(event, slider, step, lower, upper, change) {
 function show() {
   const values = get("values");
   const baseline = get("baseline");
-  const estimates = new Map((get("fit")?.parameters ?? []).map((p) => [p.name, p]));
+  const fit = isOfThisCar(get("fit")) ? get("fit") : null;
+  const estimates = new Map((fit?.parameters ?? []).map((p) => [p.name, p]));
   let changed = 0;
+  let beyond = 0;
   for (const [name, parts] of rows) {
     const { parameter, slider, field, lower, upper } = parts;
     parts.element.hidden = !(name in values);
@@ -280,6 +291,7 @@ function show() {
     slider.setAttribute("aria-valuetext", said(units.number(shown)));
     if (document.activeElement !== field) field.value = units.short(shown);
     const outside = shown < lower || shown > upper;
+    beyond += outside;
     field.title = outside
       ? said(`Beyond the slider, which goes from ${units.number(lower)} to ${units.number(upper)}`)
       : "";
@@ -294,32 +306,41 @@ function show() {
     band(parts, estimates.get(name), factor, at, shown);
   }
   $("#interval-legend").hidden = estimates.size === 0;
+  $("#outside-legend").hidden = beyond === 0;
   const same = changed === 0 && Object.keys(valuesOf(baseline)).length === Object.keys(values).length;
   $("#reset-all").disabled = same;
   $("#set-baseline").disabled = same;
 }
 
-/** The fit's interval on the track; beside it ± where the slider holds the fit, else its value. */
+/**
+ * The fit's interval on the track, as far as the track goes where an end is open; beside it ± where
+ * the slider holds the fit, else its value.
+ */
 function band(parts, estimate, factor, at, shown) {
-  const { interval, spread, parameter } = parts;
-  const known = isBounded(estimate?.confidence_interval);
-  interval.hidden = !known;
-  if (!known) {
+  const { interval, spread, parameter, lower, upper } = parts;
+  const said = estimate?.confidence_interval;
+  interval.hidden = !isKnown(said);
+  if (interval.hidden) {
     spread.textContent = estimate ? "± ∞" : "";
     spread.className = "spread no";
     spread.title = estimate ? "The runs say nothing about this parameter" : "";
     return;
   }
-  const [low, high] = estimate.confidence_interval.map((x) => x * factor);
+  const open = said.map((end) => !Number.isFinite(end));
+  const [low, high] = said.map((end, side) => (open[side] ? [lower, upper][side] : end * factor));
   interval.style.left = at(low);
   interval.style.right = `calc(100% - ${at(high).slice(4)}`;
   interval.className = `interval ${estimate.determined}`;
+  interval.classList.toggle("open-below", open[0]);
+  interval.classList.toggle("open-above", open[1]);
   const half = (high - low) / 2;
   const value = estimate.value * factor;
   spread.textContent = !holds(estimate) ? `fit ${units.number(value, 3)}`
-    : half > Math.abs(value) ? "± >100 %" : `± ${units.number(half, 2)}`;
+    : open[0] ? `≤ ${units.number(high, 3)}`
+      : open[1] ? `≥ ${units.number(low, 3)}`
+        : half > Math.abs(value) ? "± >100 %" : `± ${units.number(half, 2)}`;
   spread.className = `spread ${estimate.determined}`;
   spread.title =
     `Identified ${units.withUnit(units.number(value), parameter.display_unit)}, 95 % interval ` +
-    `${units.number(low)} to ${units.number(high)}; ${DETERMINED[estimate.determined]}`;
+    `${span(said, factor, 4)}; ${DETERMINED[estimate.determined]}`;
 }

@@ -3,6 +3,7 @@
 import * as api from "./api.js";
 import { bend, bent, holds, ofBentDamper, titleOf } from "./controls.js";
 import { h, symbol } from "./dom.js";
+import * as priors from "./priors.js";
 import { get, on, set } from "./store.js";
 import * as units from "./units.js";
 
@@ -72,7 +73,10 @@ export function view() {
     h("table", { className: "free" },
       h("thead", {}, h("tr", {}, COLUMNS.map((text) =>
         h("th", { scope: "col", className: text === "Unit" ? "unit" : "" }, text)))),
-      body));
+      body),
+    h("p", { className: "hint" }, h("span", { className: "mark-own" }, "typed"), " ",
+      h("span", { className: "mark-outside" }, "from the applied fit")),
+    priors.view(shown().map(({ name }) => name), (name) => !fixed.has(name)));
   show();
   return section;
 }

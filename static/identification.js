@@ -3,12 +3,17 @@
 import * as api from "./api.js";
 import { withValues } from "./controls.js";
 import { $, h, inPlace } from "./dom.js";
+import * as fit from "./fit.js";
 import * as free from "./free.js";
 import { jobs } from "./job.js";
+import { nameOf } from "./names.js";
 import { notice } from "./notices.js";
 import * as noise from "./noise.js";
 import { brakingOf, ready, rimsOf } from "./preparation.js";
+import * as priors from "./priors.js";
+import * as profile from "./profile.js";
 import * as result from "./result.js";
+import * as search from "./search_form.js";
 import * as setup from "./setup.js";
 import { get, on, set } from "./store.js";
 
@@ -20,7 +25,7 @@ const { now: current, busy, start: send, resume: takeUp, cancel } = jobs("identi
 
 export { current };
 
-/** Build the panel; `open` shows its tab, `apply(values)` moves the sliders. */
+/** Build the panel; `open` shows its tab, `apply(result)`, `drive` and `see` take what was found further. */
 export function build(callbacks) {
   hooks = callbacks;
   $("#identify").addEventListener("click", () => {
@@ -28,10 +33,12 @@ export function build(callbacks) {
     start();
   });
   free.build();
+  fit.build(() => { if (view === "fit") show(); });
   on("measurements ride", () => {
     const panel = $("#identification");
     if (view === "setup" && !panel.hidden && !panel.contains(document.activeElement)) show();
   });
+  on("measurements ride", saidOfRuns);
   on("vehicle", () => { if (view === "fit") show(); });
   on("values", () => { if (view === "setup" && !$("#identification").hidden) free.askBounds(); });
   show();
@@ -54,6 +61,7 @@ export async function resume() {
   view = "fit";
   if (done && done.id !== job.id) set({ fit: (await api.job("identifications", done.id)).result, fitJob: done });
   if (!busy()) await ended();
+  if (get("fitJob")) await profile.resume(get("fitJob").id);
   show();
 }
 
@@ -71,6 +79,8 @@ async function request() {
     free: free.names(),
     bounds: await free.bounds(),
     noise: noise.typed(),
+    priors: priors.typed(free.names()),
+    ...search.typed(),
     traction: get("traction"),
     settings: get("rimsSettings"),
     braking: brakingOf(runs.map(({ id }) => id)),
@@ -81,7 +91,7 @@ async function request() {
 }
 
 async function start() {
-  if (!ready() || !await send(request)) return;
+  if (![ready, search.ready, priors.ready].every((one) => one()) || !await send(request)) return;
   view = "fit";
   show();
 }
@@ -129,15 +139,28 @@ function show() {
   inPlace(panel, () => panel.replaceChildren(
     h("div", { className: "switch", role: "group", "aria-label": "Identification" },
       step("setup", "Set-up"), step("fit", "Fit"),
-      h("span", { className: "grow" }),
+      view === "fit" ? h("span", { className: "subs", role: "group", "aria-label": "Views of the fit" }, fit.tabs(current())) : null,
+      view === "setup" ? h("span", { className: "hint to-fit", id: "to-fit" }) : null,
       running
         ? h("button", { type: "button", id: "cancel", className: "danger", on: { click: cancel } },
             "Cancel")
         : h("button", { type: "button", id: "start", className: "primary", on: { click: start } },
             "Identify")),
-    view === "setup" ? setup.view() : result.view(current(), holdouts, hooks.apply),
+    view === "setup" ? setup.view(saidOfRuns) : fit.view(current(), holdouts, hooks),
   ), "#start, #cancel");
+  saidOfRuns();
   advance();
+}
+
+/** Which runs a press on Identify fits. */
+function saidOfRuns() {
+  const names = setup.fitted().map(({ id }) => nameOf(id));
+  const text = names.length ? `Fits ${names.join(", ")}` : "No run to fit";
+  $("#identify").title = `${text}: finds the free parameters`;
+  const said = $("#to-fit");
+  if (said) Object.assign(said, { textContent: text, title: text });
+  const button = $("#start");
+  if (button) button.title = text;
 }
 
 function step(key, text) {

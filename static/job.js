@@ -5,7 +5,7 @@ import { refused } from "./notices.js";
 import { on, set } from "./store.js";
 
 /**
- * Jobs of a kind ("identifications", "validations", "campaigns"), called `what` to a person.
+ * Jobs of a kind ("identifications", "profiles", "validations", "campaigns"), called `what` to a person.
  * changed() is called when the job or its state has changed, progressed() when its progress has;
  * ended() once it has ended and is read as a whole.
  */

@@ -5,8 +5,10 @@
 //
 // For the browser tests `window.ridetune` looks inside: state(key) of the store, timing (ms from a
 // slider's move to new charts), scene (connected, built, poses, last messages), drawn() (what each
-// chart shows), zoomed(), clock, job(), validation(), campaign(), idle() (no simulation under way) and unsaved().
+// chart shows), zoomed(), clock, job(), validation(), campaign(),
+// profile(), advice(), idle() (no simulation under way) and unsaved().
 
+import * as advice from "./advice.js";
 import * as api from "./api.js";
 import * as campaign from "./campaign.js";
 import * as car from "./car.js";
@@ -17,6 +19,7 @@ import { $, debounced, tabs } from "./dom.js";
 import * as identification from "./identification.js";
 import * as measurements from "./measurements.js";
 import { banner, listenToKeys, notice, refused } from "./notices.js";
+import * as profile from "./profile.js";
 import * as ride from "./ride.js";
 import * as scene from "./scene.js";
 import { idle, timing, want } from "./simulation.js";
@@ -80,6 +83,11 @@ function build() {
   });
   identification.build({
     open: () => select("tab-identification"), apply: applyFit,
+    drive: (candidate) => {
+      select("tab-measurements");
+      campaign.propose(advice.known(candidate));
+    },
+    see: (candidate) => ride.choose(`manoeuvre ${advice.known(candidate)}`),
   });
   validation.build();
   car.build();
@@ -252,7 +260,7 @@ function lost(error) {
 window.ridetune = {
   state: get, timing, scene: scene.seen, drawn: charts.drawn, zoomed: charts.zoomed,
   clock: timeline.clock, job: identification.current,
-  validation: validation.current, campaign: campaign.current, idle, unsaved: () => unsaved || saving,
+  validation: validation.current, campaign: campaign.current, profile: profile.current, advice: advice.given, idle, unsaved: () => unsaved || saving,
 };
 
 start().catch(lost);

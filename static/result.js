@@ -1,15 +1,16 @@
 // What an identification found, and how far it is while it runs.
 
 import { percent, short } from "./comfort.js";
-import { DETERMINED, isBounded, straightened, valuesOf, withValues } from "./controls.js";
+import { DETERMINED, isOfThisCar } from "./controls.js";
 import { costChart } from "./cost.js";
 import { $, breakable, fileName, h, saveFile, symbol } from "./dom.js";
+import { span } from "./intervals.js";
 import { distinct, nameOf } from "./names.js";
 import { get } from "./store.js";
 import * as units from "./units.js";
+import { combinations, summary, WORDS } from "./verdict.js";
 import { worded } from "./wording.js";
 
-const WELL = { yes: "well", weakly: "weakly", no: "not" };
 const STATES = {
   queued: "Waiting for a worker …",
   done: "Done",
@@ -19,8 +20,11 @@ const STATES = {
 
 let cost = null;
 
-/** The view of a job, or of none; `apply(result)` moves the sliders. */
-export function view(job, holdouts, apply) {
+/**
+ * The view of a job, or of none. hooks: apply(result) moves the sliders, verdict() and profile(name)
+ * show those.
+ */
+export function view(job, holdouts, hooks) {
   cost = null;
   if (!job) {
     return h("p", { className: "empty" },
@@ -33,16 +37,15 @@ export function view(job, holdouts, apply) {
   return h("div", { className: "fit" },
     h("div", { className: "fit-main scrolls", tabIndex: 0, role: "region",
       "aria-label": "Identified parameters" },
-      h("p", { className: `outcome ${job.state}`, id: "outcome" }, outcome(job), " ", toWarnings(result)),
-      estimates(result),
-      result.warnings.length
-        ? h("ul", { className: "warnings", tabIndex: -1 },
-            result.warnings.map((text) => h("li", {}, worded(text))))
-        : null),
+      h("p", { className: `outcome ${job.state}`, id: "outcome" }, outcome(job), " ",
+        summary(result, hooks.verdict), " ", toWarnings(result)),
+      ofAnotherCar(result),
+      estimates(result, hooks.profile),
+      combinations(result),
+      warnings(result)),
     h("div", { className: "fit-side scrolls" },
       h("button", { type: "button", id: "apply", className: "primary wide",
-        on: { click: () => apply(result) } }, "Apply to sliders"),
-      ofAnotherCar(result),
+        on: { click: () => hooks.apply(result) } }, "Apply to sliders"),
       scores(job, holdouts),
       h("button", { type: "button", className: "wide", title: "fit.json, also for the command line",
         on: { click: () => saveFile(result, `${fileName(job.runs[0].name)}-fit.json`) } },
@@ -65,16 +68,14 @@ function running(job) {
 function outcome(job) {
   if (job.state === "running") return `Fitting ${job.runs.map(({ id, name }) => nameOf(id) ?? name).join(", ")} …`;
   if (!job.result) return STATES[job.state];
-  const { result } = job;
-  return `${result.outcome} ${units.number(result.seconds, 2)} s, ${result.simulations} simulations.`;
+  return job.result.outcome;
 }
 
 /** A fit holds for the known data it was made with: the stiffnesses of one car suit no other. */
-function ofAnotherCar({ vehicle }) {
+function ofAnotherCar(result) {
+  if (isOfThisCar(result)) return null;
+  const { vehicle } = result;
   const now = get("vehicle");
-  const known = (car) => JSON.stringify(
-    { ...straightened(withValues(car, valuesOf(now))), name: "", source: "" });
-  if (known(vehicle) === known(now)) return null;
   return h("p", { className: "more", id: "other-car" }, vehicle.name === now.name
     ? "Found before the car's known data were changed; identify again."
     : `Found for “${vehicle.name}”, but the sliders belong to “${now.name}”.`);
@@ -86,7 +87,7 @@ function toWarnings({ warnings }) {
   return h("button", {
     type: "button", className: "link to-warnings",
     on: { click: () => {
-      $("#identification .warnings").scrollIntoView({ block: "nearest" });
+      $("#identification .warnings").lastChild.scrollIntoView({ block: "nearest" });
       $("#identification .warnings").focus({ preventScroll: true });
     } },
   }, `${warnings.length} warning${warnings.length > 1 ? "s" : ""} below`);
@@ -94,7 +95,7 @@ function toWarnings({ warnings }) {
 
 /** Only numbers and the curve move while the fit runs. */
 export function advance(job) {
-  if (!job || !cost) return;
+  if (!job || !cost?.element.isConnected) return;
   const { progress } = job;
   const history = job.result?.cost_history ?? progress?.cost_history ?? [];
   cost.show(history);
@@ -108,19 +109,25 @@ export function advance(job) {
   }));
   const before = ["queued", "running"].includes(job.state) ? "Not started yet." : "";
   $("#cost-now").textContent = last === undefined || last === null ? before
-    : `${units.number(last, 4)} after ${history.length} steps, ${simulations} simulations`;
+    : `${units.number(last, 4)} after ${history.length} steps, ${simulations} simulations` +
+      (job.result ? `, ${units.number(job.result.seconds, 2)} s` : "");
 }
 
-function estimates(result) {
+function warnings({ warnings: said }) {
+  if (!said.length) return null;
+  return h("ul", { className: "warnings", tabIndex: -1 }, said.map((text) => h("li", {}, worded(text))));
+}
+
+function estimates(result, profile) {
   const columns = [["Parameter"], ["Value"], ["Unit", "unit"], ["95 % interval"], ["Start", "long"],
-    ["Searched between", "bounds"], ["Determined"]];
+    ["Searched between", "bounds"], ["Determined"], ["", "action"]];
   return h("table", { className: "estimates" },
     h("thead", {}, h("tr", {}, columns.map(([text, className = ""]) =>
       h("th", { scope: "col", className }, text)))),
-    h("tbody", {}, result.parameters.map(estimateRow)));
+    h("tbody", {}, result.parameters.map((one) => estimateRow(one, profile))));
 }
 
-function estimateRow(estimate) {
+function estimateRow(estimate, profile) {
   const row = units.parameter(estimate.name);
   const shown = (value, digits) => units.number(value * row.display_factor, digits);
   const interval = estimate.confidence_interval;
@@ -132,8 +139,7 @@ function estimateRow(estimate) {
       h("span", { className: "soft long" }, row.label)),
     h("td", { className: "strong" }, shown(estimate.value)),
     h("td", { className: "unit" }, row.display_unit),
-    h("td", { className: "span" }, isBounded(interval)
-      ? `${shown(interval[0], 3)} … ${shown(interval[1], 3)}` : "unbounded"),
+    h("td", { className: "span" }, span(interval, row.display_factor)),
     h("td", { className: "soft long" }, shown(estimate.start)),
     h("td", { className: "soft span bounds" }, bounds),
     h("td", {}, h("span", {
@@ -141,7 +147,10 @@ function estimateRow(estimate) {
       title: estimate.at_bound
         ? `At its ${upper ? "upper" : "lower"} bound, so ${DETERMINED[estimate.determined]}. ${searched}`
         : DETERMINED[estimate.determined],
-    }, estimate.at_bound ? `at ${upper ? "upper" : "lower"}` : WELL[estimate.determined])));
+    }, estimate.at_bound ? `at ${upper ? "upper" : "lower"}` : WORDS[estimate.determined])),
+    h("td", { className: "action" }, h("button", { type: "button", className: "profile-of",
+      "aria-label": `Profile of ${row.label}`, title: "Profile: how the fit gets worse when this one is held elsewhere",
+      on: { click: () => profile(estimate.name) } })));
 }
 
 /** Fit percent of every run, fitted or held out, in the channels that the fit compares. */

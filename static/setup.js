@@ -5,6 +5,7 @@ import * as free from "./free.js";
 import { lacks, nameOf, original } from "./names.js";
 import * as noise from "./noise.js";
 import * as preparation from "./preparation.js";
+import * as search from "./search_form.js";
 import { get } from "./store.js";
 
 const ROLES = { fit: "fit", holdout: "hold out", no: "leave out" };
@@ -33,29 +34,31 @@ export function unseen(seen) {
   return get("measurements").filter((run) => run.usable_for_identification && !data.has(run.sha256));
 }
 
-export function view() {
+/** The set-up; `used()` is called when the use of a run has changed. */
+export function view(used) {
   const runs = get("measurements");
   return h("div", { className: "setup scrolls" },
     h("section", {},
       h("h3", {}, "Runs"),
       runs.length
-        ? h("ul", { className: "runs" }, runs.map(runRow))
+        ? h("ul", { className: "runs" }, runs.map((run) => runRow(run, used)))
         : h("p", { className: "empty" }, "No measurement yet; add one under Measurements."),
       h("p", { className: "hint" },
         "Unless you choose, the recording on show is fitted, or the first. A run held out shows how " +
         "well the car predicts what it has not seen."),
       preparation.view(),
-      noise.view(fitted())),
+      noise.view(fitted()),
+      search.view()),
     free.view());
 }
 
-function runRow(run) {
+function runRow(run, used) {
   const role = roleOf(run);
   return h("li", {},
     h("span", { className: "run-name", title: nameOf(run.id) }, breakable(nameOf(run.id))),
     run.usable_for_identification
       ? h("span", { className: "run-use" },
-          select(ROLES, role, (value) => { roles[run.id] = value; noise.show(fitted()); },
+          select(ROLES, role, (value) => { roles[run.id] = value; noise.show(fitted()); used(); },
             { "aria-label": `Use of ${nameOf(run.id)}` }),
           h("label", {}, "brakes", preparation.brakingField(run)),
           copied(run))

@@ -32,7 +32,7 @@ export function want(...names) {
 }
 
 /** A car on the chosen ride, as much of it as the page shows. */
-function request(car) {
+export function request(car) {
   return {
     ...ofRide(car), max_samples: MOST_SAMPLES, decimate: "stride", seq: ++sequence,
     channels: [...new Set([...POSE_CHANNELS, ...visibleChannels()])],
@@ -46,7 +46,7 @@ export function ofRide(car) {
   if (ride.kind === "measurement") {
     body.rims = rimsOf(ride.id);
   } else {
-    body.manoeuvre = ride.key;
+    body.manoeuvre = get("manoeuvres").find(({ key }) => key === ride.key)?.given ?? ride.key;
     body.lift_off = get("liftOff");
     if (get("road")) body.road = get("road");
   }
@@ -97,7 +97,7 @@ async function now() {
   const run = await retried(scene ? "scene" : "now", () => api.simulate(request({ vehicle, values, scene })))
     .catch((error) => { throw Object.assign(error, { values }); });
   if (!isStill()) return;
-  set({ trouble: null, now: run, vehicleNow: withValues(vehicle, values) });
+  set({ trouble: null, now: run, valuesNow: values, vehicleNow: withValues(vehicle, values) });
   timing.shown.push(performance.now() - asked);
   if (timing.shown.length > 500) timing.shown.shift();
 }

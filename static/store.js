@@ -6,6 +6,7 @@
 //   baseline     the vehicle that the sliders are compared with
 //   values       {parameter name: SI value}, the sliders
 //   measurements, vehicles, manoeuvres, plants, formats, roads   lists of the service
+//                (a manoeuvre that the service does not know by its key is `given` as an object)
 //   ride         {kind: "measurement", id} or {kind: "manoeuvre", key}
 //   road         null (as the manoeuvre says) or a road description
 //   traction     how a measured ride gets its traction, "exact" or "paper"
@@ -15,6 +16,8 @@
 //   liftOff      wheels may leave the road
 //   compare      "baseline", "7dof" or "none"
 //   now, reference, measured   runs (see api.js) of the ride, or null
+//   valuesNow    the sliders' values with which `now` was simulated
+//   bands        95 % bands of `now` by the errors of the fit (a run with X.lower, X.upper), or null
 //   trouble      why the last simulation was refused (its `values` with which sliders), or null
 //   fit          the last finished fit (fit.json) or null: the sliders' error bars
 //   fitJob       the identification that found it (its id and runs)

@@ -107,7 +107,7 @@ function state() {
 }
 
 function runRow(run, role) {
-  const manoeuvres = get("manoeuvres").filter(({ kind }) => kind !== "posts");
+  const manoeuvres = get("manoeuvres").filter(({ kind, given }) => kind !== "posts" && !given);
   const choice = h("select", { "aria-label": `Manoeuvre of ${nameOf(run.id)}`,
     title: "Where the very manoeuvre and road are known, the run is predicted over its road as well",
     on: { change: () => tell(run.id, choice.value) } },

@@ -2,6 +2,7 @@
 
 import { h, symbol } from "./dom.js";
 import { figure } from "./figure.js";
+import { span } from "./intervals.js";
 import { COLOURS } from "./plots.js";
 import * as units from "./units.js";
 import { worded } from "./wording.js";
@@ -124,12 +125,12 @@ function estimates({ fit, geometry }) {
       const row = units.parameter(one.name);
       const number = (value, digits) => units.number(value === null ? NaN : value * row.display_factor, digits);
       const [lower, upper] = one.confidence_interval;
-      const half = lower === null || upper === null ? null : (upper - lower) / 2;
+      const open = lower === null || upper === null;
       return h("tr", {},
         h("th", { scope: "row", title: row.label }, symbol(row.symbol), " ",
           h("span", { className: "long" }, row.label)),
         h("td", { className: "strong" }, number(one.value)),
-        h("td", {}, half === null ? "unknown" : number(half, 2)),
+        h("td", {}, open ? span([lower, upper], row.display_factor) : number((upper - lower) / 2, 2)),
         h("td", { className: "unit" }, row.display_unit),
         measured ? h("td", {}, one.name in geometry ? number(geometry[one.name]) : "") : null,
         h("td", { className: "soft" }, `${number(one.lower, 3)} … ${number(one.upper, 3)}`),

@@ -1,0 +1,62 @@
+// How a fit searches: from how many starts, and how much outliers count.
+
+import { fold, h } from "./dom.js";
+import * as units from "./units.js";
+
+const LOSSES = {
+  linear: "least squares", soft_l1: "soft L1", huber: "Huber", cauchy: "Cauchy", arctan: "arctan",
+};
+const USUAL = { starts: 1, seed: 0, loss: "linear", loss_scale: 3 };
+const MOST_STARTS = 1024;
+const memory = { open: false };
+const asked = { ...USUAL };
+
+/** The fields of a request. */
+export const typed = () => ({ ...asked });
+
+export function view() {
+  const summary = h("summary");
+  const scale = number("loss_scale", "From so many noises on", { min: "0.01", step: "any" },
+    "Residuals beyond this many noises count as outliers");
+  const follow = () => {
+    scale.field.disabled = asked.loss === "linear";
+    summary.textContent = `Search: ${said()}`;
+  };
+  const loss = h("select", { id: "loss", title: "How residuals far beyond the noise count: squared, or less",
+    on: { change: () => { asked.loss = loss.value; follow(); } } },
+  Object.entries(LOSSES).map(([key, text]) => h("option", { value: key, selected: key === asked.loss }, text)));
+  function number(key, label, properties, title) {
+    const field = h("input", { type: "number", id: `search-${key}`, title, value: asked[key], ...properties,
+      on: { change: () => {
+        if (field.value === "") field.value = USUAL[key];
+        if (field.reportValidity()) asked[key] = Number(field.value);
+        follow();
+      } } });
+    return { field, label: h("label", { className: "block" }, label, field) };
+  }
+  const part = fold(memory, summary, h("div", { className: "search-fields" },
+    number("starts", "Starts", { min: "1", max: String(MOST_STARTS), step: "1" },
+      "1: the sliders' values alone. 64: further points between the bounds, the best of which are searched from, " +
+      "to find other minima").label,
+    number("seed", "Seed of the starts", { min: "0", step: "1" }, "Another whole number draws other starts").label,
+    h("label", { className: "block" }, "Outliers count by", loss), scale.label));
+  follow();
+  return part;
+}
+
+/** What differs from what is usual. */
+function said() {
+  const parts = [
+    asked.starts !== USUAL.starts && `${asked.starts} starts`,
+    asked.loss !== USUAL.loss && `${LOSSES[asked.loss]} from ${units.plain(asked.loss_scale)} noises`,
+  ].filter(Boolean);
+  return parts.length ? parts.join(", ") : "one start, least squares";
+}
+
+/** Whether every field can be read; the first that cannot says so. */
+export function ready() {
+  const wrong = document.querySelector(".search-fields input:invalid");
+  if (wrong) wrong.closest("details").open = true;
+  wrong?.reportValidity();
+  return !wrong;
+}

@@ -1,0 +1,141 @@
+"""What a fit is worth, on the page: verdict, correlation, profile, next run, search."""
+
+import pytest
+
+from .conftest import SAMPLES, add_file
+
+pytestmark = pytest.mark.browser
+
+TWIN = SAMPLES / "twin"
+
+
+@pytest.fixture
+def analyst(visitor):
+    """With the twin's car and its manoeuvre 2 as the only run that is fitted."""
+    visitor.click("#tab-measurements")
+    add_file(visitor, "vehicle.json", (TWIN / "vehicle.json").read_bytes())
+    visitor.until("ridetune.state('vehicle').name === ridetune.state('baseline').name")
+    add_file(visitor, "twin.csv", (TWIN / "manoeuvre_2.csv").read_bytes())
+    visitor.until("ridetune.state('measurements').length === 3")
+    visitor.page.get_by_role("button", name="Use as ride").click()
+    visitor.click("#tab-identification")
+    for name in ("detailed_manoeuvre_1.csv", "detailed_manoeuvre_2.csv"):
+        visitor.page.get_by_label(f"Use of {name}").select_option("no")
+    return visitor
+
+
+def fitted(visitor):
+    visitor.click("#start")
+    visitor.until("ridetune.state('fit') !== null", 150)
+    return visitor.look("ridetune.state('fit')")
+
+
+def test_a_fit_tells_what_its_run_determines_and_what_to_drive_next(analyst):
+    """Truth: a bar acts on the wheels as K_tor/d^2, so that the run holds that and not the two."""
+    visitor, page = analyst, analyst.page
+    assert visitor.element("#to-fit").inner_text() == "Fits twin.csv"
+    fit = fitted(visitor)
+
+    # The verdict names the combination; the table has it in N/mm.
+    page.locator("#fit-verdict").click()
+    said = visitor.element(".verdict-said").inner_text().replace("\n", "")
+    assert "KtorF and dF are determined only together, as KtorF/dF²" in said
+    [rate] = [one for one in fit["verdict"]["combinations"] if one["name"] == "front.bar_rate"]
+    assert f"{rate['value'] / 1000:.4g} N/mm" in said
+    assert visitor.element(".direction").first.inner_text()
+
+    # The pair is marked by more than its colour, and read by the keyboard.
+    page.locator("#fit-correlation").click()
+    names = [one["name"] for one in fit["parameters"]]
+    row, column = names.index("front.stabilizer_bar.stiffness"), names.index("front.pivot.distance")
+    cell = page.locator(".correlation tbody tr").nth(row).locator("td").nth(column)
+    assert fit["correlation"][row][column] > 0.9
+    assert cell.inner_text() == "+"
+    page.locator(".correlation tbody tr").nth(row).locator("td").nth(column - 1).focus()
+    page.keyboard.press("ArrowRight")
+    told = visitor.element(".correlation-said").inner_text().replace("\n", "")
+    assert f"KtorF and dF: {fit['correlation'][row][column]:.3f}" in told
+
+    # A profile is drawn through the fit, to both sides of it.
+    page.locator("#fit-parameters").click()
+    page.get_by_label("Profile of Front spring stiffness").click()
+    visitor.until("ridetune.profile()?.state === 'done'", 120)
+    page.locator(".profile-plot canvas").wait_for()
+    profile = visitor.look("ridetune.profile().result")
+    low, high = profile["confidence_interval"]
+    assert (
+        f"{low / 1000:.1f} … {high / 1000:.1f} N/mm"
+        in visitor.element(".profile-said").inner_text()
+    )
+    steps = page.get_by_label("Held at, N/mm")
+    steps.focus()
+    page.keyboard.press("End")
+    last = profile["points"][-1]["value"] / 1000
+    assert f"held at {last:.2f} N/mm" in visitor.element(".profile-others").inner_text()
+
+    # Braking comes first, is seen as a ride, and is chosen in the campaign form.
+    page.locator("#fit-advice").click()
+    visitor.until("ridetune.advice() !== null", 120)
+    best = visitor.look("ridetune.advice().candidates[0]")
+    assert best["key"].startswith("brake")
+    assert visitor.element(".before-after tbody tr").count() == 12
+    visitor.click("#see-candidate")
+    visitor.until("ridetune.state('now')?.head.mode === 'road'")
+    assert visitor.look("ridetune.state('now').head.duration") == pytest.approx(best["duration"])
+    visitor.click("#drive-candidate")
+    chosen = page.locator(".campaign-manoeuvres input:checked")
+    assert chosen.count() == 1
+    assert chosen.get_attribute("value") == best["key"]
+    assert f"1 drive, {best['duration']:g} s" in visitor.element("#campaign-state").inner_text()
+
+
+def test_a_search_is_told_of_starts_outliers_and_priors(analyst):
+    """What differs from the usual is told where it is folded away, and is asked of the service."""
+    visitor, page = analyst, analyst.page
+    summaries = {
+        word: page.locator("#identification summary", has_text=word)
+        for word in ("Search", "Known before")
+    }
+    for summary in summaries.values():
+        summary.click()
+    page.fill("#search-starts", "8")
+    page.select_option("#loss", "huber")
+    mean = page.get_by_label("Mean of Rear pivot distance known before, m")
+    mean.fill("1.1")
+    mean.press("Tab")
+    assert summaries["Known before"].inner_text() == "Known before: nothing"
+    visitor.click("#start")
+    assert visitor.look("ridetune.job()") is None, "half a prior is not sent"
+    deviation = page.get_by_label("Standard deviation of Rear pivot distance known before, m")
+    deviation.fill("0.05")
+    deviation.press("Tab")
+    assert summaries["Search"].inner_text() == "Search: 8 starts, Huber from 3 noises"
+    assert summaries["Known before"].inner_text().replace("\n", "") == "Known before: dR"
+
+    fit = fitted(visitor)
+    job = visitor.look("ridetune.job()")
+    assert (job["starts"], job["loss"]) == (8, "huber")
+    assert job["priors"] == {"rear.pivot.distance": [1.1, 0.05]}
+    page.locator("#fit-minima").click()
+    assert visitor.element(".minima tbody tr").count() == len(fit["minima"])
+    page.locator("#fit-residuals").click()
+    rows = visitor.element(".whiteness .channel").all_inner_texts()
+    assert len(rows) == len(fit["whiteness"]) == 3
+    assert all("white, like noise" in row for row in rows)
+    page.locator("#fit-verdict").click()
+    assert "1.10 ± 0.050" in visitor.element(".priors-check").inner_text()
+
+
+def test_an_interval_that_is_open_to_one_side_says_from_where(visitor):
+    """The sample car's front bar ends at its upper bound; beyond it the search has not looked."""
+    visitor.click("#identify")
+    visitor.until("ridetune.state('fit') !== null", 150)
+    found = visitor.look("ridetune.state('fit').parameters")
+    [bar] = [one for one in found if one["name"] == "front.stabilizer_bar.stiffness"]
+    low, high = bar["confidence_interval"]
+    assert high is None
+    row = visitor.page.locator(".estimates tr", has_text="KtorF")
+    expected = "unbounded" if low is None else "from "
+    assert expected in row.inner_text()
+    outcome = visitor.element("#outcome").inner_text()
+    assert "at a bound of the search" in outcome
