@@ -22,6 +22,10 @@ const RUNS = [
   { key: "reference", label: "baseline", stroke: COLOURS.reference, width: 1.2, dash: [6, 4] },
   { key: "now", label: "now", stroke: COLOURS.now, width: 1.6, dash: [] },
 ];
+/** Ends of the error band, whose area is filled. */
+const ENDS = ["lower", "upper"];
+/** The band does not make a chart higher than this many heights of the curve beyond it. */
+const BAND_ROOM = 1;
 const SYNC = "ride";
 const FREQUENCIES = [0.2, 30];
 const BOTTOM_AXIS = 38;
@@ -29,6 +33,8 @@ const BARE_AXIS = 10;
 const CLICK_PIXELS = 4;
 /** Decades of a spectrum that are shown below its peak; deeper ones are rounding errors. */
 const DEPTH = 6;
+
+const LINES = RUNS.length;
 
 let group = "body";
 let charts = [];
@@ -45,10 +51,11 @@ export const visibleChannels = () =>
 export const allChannels = () =>
   Object.values(GROUPS).flatMap(([, names]) => names).filter((name) => !name.startsWith(SPECTRUM));
 
-/** What the browser tests look at: {channel: {measured, reference, now}} as drawn. */
+/** What the browser tests look at: {channel: {measured, reference, now, lower, upper}} as drawn. */
 export const drawn = () =>
   Object.fromEntries(charts.map(({ name, plot }) => [name,
-    Object.fromEntries(RUNS.map(({ key }, i) => [key, Array.from(plot.data[i + 1])]))]));
+    Object.fromEntries([...RUNS.map(({ key }) => key), ...(plot.data.length > LINES + 1 ? ENDS : [])]
+      .map((key, i) => [key, Array.from(plot.data[i + 1])]))]));
 export const zoomed = () => zoom;
 
 /** Build the tabs; `changed` is called when other channels are needed. */
@@ -59,7 +66,8 @@ export function build(changed) {
       role: "tab", type: "button", id: `charts-${key}`, "aria-controls": "chart-area",
     }, title));
   }
-  list.append(h("span", { className: "legend-line", id: "legend" }));
+  list.append(h("span", { className: "chart-keys" }, h("span", { id: "band-place" }),
+    h("span", { className: "legend-line", id: "legend" })));
   legend();
   tabs(list, (id) => {
     group = id.replace("charts-", "");
@@ -67,7 +75,7 @@ export function build(changed) {
     onGroup();
   });
   onGroup = changed;
-  on("now reference measured trouble", fill);
+  on("now reference measured trouble bands", fill);
   on("trouble", say);
   on("compare ride", legend);
   onTime(cursor);
@@ -121,7 +129,7 @@ function chart(name, bottom, area) {
       `${title}${sign} `, h("span", { className: "unit" }, unit)), h("span", { className: "readings" }, values)),
     h("p", { className: "chart-empty", hidden: true }));
   area.append(box);
-  const plot = new window.uPlot(options(name, spectrum, bottom || spectrum), [[], [], [], []], box);
+  const plot = new window.uPlot(options(name, spectrum, bottom || spectrum), columns([], RUNS.map(() => []), spectrum ? null : [[], []]), box);
   const line = h("div", { className: "time-line" });
   if (!spectrum) plot.over.append(line);
   plot.root.setAttribute("role", "img");
@@ -144,7 +152,8 @@ function options(name, spectrum, labelled) {
     ],
     series: [{}, ...RUNS.map(({ label, stroke, width, dash }) => ({
       label, stroke, width, dash, points: { show: false }, spanGaps: false,
-    }))],
+    })), ...(spectrum ? [] : ENDS.map((label) => ({ label, width: 0, points: { show: false }, spanGaps: false })))],
+    bands: spectrum ? [] : [{ series: [LINES + 2, LINES + 1], fill: COLOURS.band }],
     cursor: { points: { show: false }, drag: { x: true, y: false, setScale: true } },
     hooks: { setCursor: [pointed], ready: [clickable] },
   };
@@ -191,12 +200,26 @@ function fill() {
     }
     const x = base ? base.time : [];
     plot.batch(() => {
-      plot.setData([x, ...runs.map((run, i) => onGrid(run, data[i], base, factor))], false);
+      plot.setData(columns(x, runs.map((run, i) => onGrid(run, data[i], base, factor)), within(channel, base, factor)), false);
       const [min, max] = zoom ?? [x[0] ?? 0, x[x.length - 1] ?? 1];
       plot.setScale("x", { min, max });
     });
   }
   cursor();
+}
+
+const columns = (x, lines, band) => [x, ...lines, ...(band ?? [])];
+
+/** Both ends of a channel's band; empty where there is none. */
+function within(channel, base, factor) {
+  const run = get("bands");
+  const nothing = Array(base ? base.time.length : 0).fill(null);
+  const curve = get("now")?.values[channel];
+  if (!run || !curve || !run.values[`${channel}.lower`]) return [nothing, nothing];
+  const [low, high] = curve.reduce(([least, most], v) => [Math.min(least, v), Math.max(most, v)], [Infinity, -Infinity]);
+  const beyond = BAND_ROOM * (high - low) || Infinity;
+  return ENDS.map((end) => onGrid(run, run.values[`${channel}.${end}`], base, factor)
+    .map((v) => (v === null ? null : Math.min(Math.max(v, (low - beyond) * factor), (high + beyond) * factor))));
 }
 
 function fillSpectrum({ plot, factor }, runs, channel) {

@@ -2,6 +2,7 @@
 
 import * as api from "./api.js";
 import { $, fileName, h, saveFile } from "./dom.js";
+import { span } from "./intervals.js";
 import { nameOf } from "./names.js";
 import { refused } from "./notices.js";
 import { ofRide } from "./simulation.js";
@@ -26,7 +27,7 @@ export function build() {
     h("button", { type: "button", id: "save-run",
       title: "Every channel of the simulated ride as a measurement file", on: { click: save } },
       "Save run as CSV")));
-  on("now reference measured compare trouble", show);
+  on("now reference measured compare trouble bands", show);
   show();
 }
 
@@ -40,7 +41,7 @@ function show() {
     return;
   }
   const name = get("compare") === "7dof" ? "7-DOF model" : "Baseline";
-  const rows = now.metrics.map((metric) => row(metric, find(other, metric.name)));
+  const rows = now.metrics.map((metric) => row(metric, find(other, metric.name), find(get("bands")?.head, metric.name)));
   const figures = h("table", { className: "metrics" },
     h("thead", {}, h("tr", {},
       h("th", { scope: "col" }, "Metric of the ride"), h("th", { scope: "col" }, name),
@@ -65,16 +66,24 @@ async function save() {
 
 const find = (head, name) => head?.metrics.find((metric) => metric.name === name);
 
-function row(metric, before) {
+function row(metric, before, within) {
   const factor = metric.display_factor ?? 1;
   const change = before && Math.abs(before.value) > 1e-12
     ? (metric.value - before.value) / Math.abs(before.value) : null;
   return h("tr", {},
     h("th", { scope: "row", title: metric.meaning ?? "" }, metric.label),
     h("td", {}, before ? units.number(before.value * factor, 3) : "–"),
-    h("td", {}, units.number(metric.value * factor, 3)),
+    h("td", {}, units.number(metric.value * factor, 3), within ? spread(within.interval, factor) : null),
     h("td", { className: "unit" }, units.pretty(metric.display_unit ?? metric.unit)),
     changed(change));
+}
+
+/** How far the errors of the fit leave a figure open. */
+function spread(interval, factor) {
+  const [low, high] = interval;
+  const open = !Number.isFinite(low) || !Number.isFinite(high);
+  return h("span", { className: "soft", title: `95 % by the errors of the fit: ${span(interval, factor)}` },
+    open ? " ± ∞" : ` ± ${units.number(factor * (high - low) / 2, 2)}`);
 }
 
 /** Less is better in every metric; arrows say it without colour. */

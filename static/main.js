@@ -10,6 +10,7 @@
 
 import * as advice from "./advice.js";
 import * as api from "./api.js";
+import * as bands from "./bands.js";
 import * as campaign from "./campaign.js";
 import * as car from "./car.js";
 import * as charts from "./charts.js";
@@ -41,7 +42,7 @@ let saving = false;
 async function start() {
   api.useSession(sid);
   set({ session: sid, online: true, ready: false, compare: "baseline", road: null, liftOff: false, fit: null, fitJob: null,
-    now: null, reference: null, measured: null, traction: "exact", braking: {} });
+    now: null, reference: null, measured: null, bands: null, traction: "exact", braking: {} });
   const [
     session, parameters, channels, vehicles, manoeuvres, plants, formats, roads, rimsSettings,
   ] = await Promise.all([
@@ -77,6 +78,7 @@ function build() {
   controls.build({ onBaseline: setBaseline });
   ride.build();
   charts.build(() => want("now", "reference"));
+  bands.build();
   comfort.build();
   measurements.build({
     open: () => select("tab-measurements"), takeVehicle: car.load, campaign: campaign.build(),
@@ -190,6 +192,7 @@ async function setBaseline() {
 function applyFit(result) {
   set({ values: { ...get("values"),
     ...Object.fromEntries(result.parameters.map(({ name, value }) => [name, value])) } });
+  bands.applied();
   save();
   notice("info", "The sliders hold the identified car",
     "“Set baseline” makes it the car that later changes are compared with.");

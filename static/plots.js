@@ -6,6 +6,8 @@ const style = getComputedStyle(document.documentElement);
 export const COLOURS = Object.fromEntries(["measured", "reference", "now"].map((run) =>
   [run, style.getPropertyValue(`--${run}`).trim()]));
 
+COLOURS.band = `${COLOURS.now}40`;
+
 const GRID = style.getPropertyValue("--grid").trim();
 
 export const AXIS = {

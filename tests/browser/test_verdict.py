@@ -1,5 +1,6 @@
-"""What a fit is worth, on the page: verdict, correlation, profile, next run, search."""
+"""What a fit is worth, on the page: verdict, correlation, profile, next run, error band, search."""
 
+import numpy as np
 import pytest
 
 from .conftest import SAMPLES, add_file
@@ -87,6 +88,35 @@ def test_a_fit_tells_what_its_run_determines_and_what_to_drive_next(analyst):
     assert chosen.count() == 1
     assert chosen.get_attribute("value") == best["key"]
     assert f"1 drive, {best['duration']:g} s" in visitor.element("#campaign-state").inner_text()
+
+
+def test_the_error_band_of_an_applied_fit_holds_its_curve_and_follows_no_other(analyst):
+    """Truth: a symmetrical band holds the curve about which it is taken."""
+    visitor, page = analyst, analyst.page
+    fitted(visitor)
+    assert not page.get_by_label("Error band").is_checked()
+    visitor.click("#apply")
+    visitor.until("ridetune.state('bands') !== null")
+    for channel in ("chassis.z", "chassis.pitch", "chassis.roll"):
+        low, curve, high = (visitor.line(channel, one) for one in ("lower", "now", "upper"))
+        assert np.all(low <= curve + 1e-6)
+        assert np.all(curve <= high + 1e-6)
+        assert np.nanmax(high - low) > 0.0
+    visitor.click("#tab-comfort")
+    assert "±" in visitor.element(".metrics:not(.fits) tbody").inner_text()
+
+    # A slider that moves takes the band away at once; wanted, it comes again when the slider rests.
+    page.get_by_label("Error band").uncheck()
+    assert visitor.look("ridetune.state('bands')") is None
+    page.get_by_label("Error band").check()
+    visitor.until("ridetune.state('bands') !== null")
+    before = visitor.line("chassis.pitch", "upper")
+    visitor.element("#slider-front-suspension-stiffness").press("PageUp")
+    assert visitor.look("ridetune.state('bands')") is None
+    visitor.until("ridetune.state('bands') !== null")
+    low, curve, high = (visitor.line("chassis.pitch", one) for one in ("lower", "now", "upper"))
+    assert np.abs(high - before).max() > 1e-4
+    assert np.all((low <= curve + 1e-6) & (curve <= high + 1e-6))
 
 
 def test_a_search_is_told_of_starts_outliers_and_priors(analyst):
