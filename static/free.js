@@ -4,6 +4,7 @@ import * as api from "./api.js";
 import { bend, bent, holds, ofBentDamper, titleOf } from "./controls.js";
 import { h, symbol } from "./dom.js";
 import * as priors from "./priors.js";
+import * as sensors from "./sensors_form.js";
 import { get, on, set } from "./store.js";
 import * as units from "./units.js";
 
@@ -76,6 +77,7 @@ export function view() {
       body),
     h("p", { className: "hint" }, h("span", { className: "mark-own" }, "typed"), " ",
       h("span", { className: "mark-outside" }, "from the applied fit")),
+    sensors.view(),
     priors.view(shown().map(({ name }) => name), (name) => !fixed.has(name)));
   show();
   return section;

@@ -14,6 +14,7 @@ import * as priors from "./priors.js";
 import * as profile from "./profile.js";
 import * as result from "./result.js";
 import * as search from "./search_form.js";
+import * as sensors from "./sensors_form.js";
 import * as setup from "./setup.js";
 import { get, on, set } from "./store.js";
 
@@ -81,6 +82,7 @@ async function request() {
     noise: noise.typed(),
     priors: priors.typed(free.names()),
     ...search.typed(),
+    ...sensors.typed(),
     traction: get("traction"),
     settings: get("rimsSettings"),
     braking: brakingOf(runs.map(({ id }) => id)),
@@ -91,9 +93,15 @@ async function request() {
 }
 
 async function start() {
-  if (![ready, search.ready, priors.ready].every((one) => one()) || !await send(request)) return;
+  if (![ready, search.ready, priors.ready, sensors.ready].every((one) => one()) || !await send(request)) return;
   view = "fit";
   show();
+}
+
+/** Take what the fit offers for one of its channels, and fit again. */
+function offer(one) {
+  sensors.take(one);
+  start();
 }
 
 function advance() {
@@ -146,7 +154,7 @@ function show() {
             "Cancel")
         : h("button", { type: "button", id: "start", className: "primary", on: { click: start } },
             "Identify")),
-    view === "setup" ? setup.view(saidOfRuns) : fit.view(current(), holdouts, hooks),
+    view === "setup" ? setup.view(saidOfRuns) : fit.view(current(), holdouts, { ...hooks, offer }),
   ), "#start, #cancel");
   saidOfRuns();
   advance();

@@ -6,6 +6,7 @@ import { costChart } from "./cost.js";
 import { $, breakable, fileName, h, saveFile, symbol } from "./dom.js";
 import { span } from "./intervals.js";
 import { distinct, nameOf } from "./names.js";
+import * as sensors from "./sensors_form.js";
 import { get } from "./store.js";
 import * as units from "./units.js";
 import { combinations, summary, WORDS } from "./verdict.js";
@@ -22,7 +23,7 @@ let cost = null;
 
 /**
  * The view of a job, or of none. hooks: apply(result) moves the sliders, verdict() and profile(name)
- * show those.
+ * show those, offer(one) applies what the fit offers.
  */
 export function view(job, holdouts, hooks) {
   cost = null;
@@ -42,7 +43,8 @@ export function view(job, holdouts, hooks) {
       ofAnotherCar(result),
       estimates(result, hooks.profile),
       combinations(result),
-      warnings(result)),
+      sensors.found(result, { span, words: WORDS }),
+      warnings(result, hooks.offer)),
     h("div", { className: "fit-side scrolls" },
       h("button", { type: "button", id: "apply", className: "primary wide",
         on: { click: () => hooks.apply(result) } }, "Apply to sliders"),
@@ -113,9 +115,13 @@ export function advance(job) {
       (job.result ? `, ${units.number(job.result.seconds, 2)} s` : "");
 }
 
-function warnings({ warnings: said }) {
-  if (!said.length) return null;
-  return h("ul", { className: "warnings", tabIndex: -1 }, said.map((text) => h("li", {}, worded(text))));
+/** What is wrong or doubtful, with a button where the fit offers the remedy. */
+function warnings({ warnings: said, offers = [] }, apply) {
+  if (!said.length && !offers.length) return null;
+  return h("ul", { className: "warnings", tabIndex: -1 },
+    offers.map((offer) => h("li", { className: "offer" }, h("span", {}, worded(offer.sentence)),
+      h("button", { type: "button", on: { click: () => apply(offer) } }, "Apply and fit again"))),
+    said.map((text) => h("li", {}, worded(text))));
 }
 
 function estimates(result, profile) {

@@ -169,3 +169,35 @@ def test_an_interval_that_is_open_to_one_side_says_from_where(visitor):
     assert expected in row.inner_text()
     outcome = visitor.element("#outcome").inner_text()
     assert "at a bound of the search" in outcome
+
+
+def test_a_turned_channel_is_offered_to_be_turned_back(visitor):
+    """Truth: the twin's roll with the sign turned over in the file, and the rear spring."""
+    visitor.click("#tab-measurements")
+    add_file(visitor, "vehicle.json", (TWIN / "vehicle.json").read_bytes())
+    visitor.until("ridetune.state('vehicle').name === ridetune.state('baseline').name")
+    header, *rows = (TWIN / "manoeuvre_2.csv").read_text().splitlines()
+    place = [name.split(" ")[0] for name in header.split(",")].index("chassis.roll")
+    turned = [row.split(",") for row in rows]
+    for row in turned:
+        row[place] = str(-float(row[place]))
+    text = "\n".join([header, *(",".join(row) for row in turned)]) + "\n"
+    add_file(visitor, "turned.csv", text.encode())
+    visitor.until("ridetune.state('measurements').length === 3")
+    visitor.page.get_by_role("button", name="Use as ride").click()
+    visitor.click("#tab-identification")
+    visitor.click("#start")
+    visitor.until("ridetune.state('fit') !== null", 150)
+    [offer] = visitor.look("ridetune.state('fit').offers")
+    assert offer["channel"] == "chassis.roll"
+    first = visitor.look("ridetune.job().id")
+    visitor.page.get_by_role("button", name="Apply and fit again").click()
+    visitor.until(f"ridetune.job().id !== '{first}' && ridetune.job().state === 'done'", 150)
+    fit = visitor.look("ridetune.state('fit')")
+    assert fit["offers"] == []
+    assert fit["fixed_sensors"] == {"chassis.roll": {"sign": -1}}
+    [spring] = [one for one in fit["parameters"] if one["name"] == "rear.suspension.stiffness"]
+    low, high = spring["confidence_interval"]
+    assert low < 27000 < high
+    visitor.click("#identification >> text=Set-up")
+    assert visitor.page.get_by_text("Sensors: roll").is_visible()
