@@ -41,6 +41,8 @@ def _column(found: "Survey", index: int) -> dict[str, Any]:
         "unit": column.unit,
         "comment": column.comment,
         "samples": column.samples,
+        "clock": column.clock,
+        "step": column.step,
         **_numbers(found.known.get(index)),
         "guess": None if chosen is None else asdict(chosen),
         "candidates": [asdict(one) for one in found.guess.candidates[index]],

@@ -87,6 +87,8 @@ def test_columns_come_with_numbers_guess_reasons_and_candidates(visitor, kept):
     assert pitch["candidates"][0] == pitch["guess"]
     assert columns["Oeldruck"]["guess"] is None
     assert columns["Oeldruck"]["constant"] is True
+    assert [one["clock"] for one in found["columns"]] == [None, *[0] * 8]
+    assert {one["step"] for one in found["columns"]} == {None}
     assert {one["channel"] for one in found["proposed"]["columns"]} == set(TITLES)
     json.dumps(found, allow_nan=False)
 
