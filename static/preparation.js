@@ -5,9 +5,12 @@ import { nameOf } from "./names.js";
 import { get, set } from "./store.js";
 
 const FILTERS = [
-  ["a_x_cutoff_hz", "aₓ", "longitudinal acceleration"],
-  ["rim_cutoff_hz", "wheels", "wheel centres"],
-  ["output_cutoff_hz", "z, pitch, roll", "compared channels, recorded and simulated alike"],
+  ["a_x_cutoff_hz", "aₓ below", "Low-pass of the longitudinal acceleration"],
+  ["rim_cutoff_hz", "wheels below", "Low-pass of the wheel centres"],
+  ["output_cutoff_hz", "z, pitch, roll below",
+    "Low-pass of the compared channels, recorded and simulated alike"],
+  ["output_highpass_hz", "z, pitch, roll above",
+    "High-pass of the compared channels, recorded and simulated alike"],
 ];
 const TRACTIONS = { exact: "exact", paper: "paper (biased)" };
 const memory = { open: false };
@@ -35,12 +38,12 @@ export function view() {
       (initial_state) => change({ initial_state }),
       "of the body: at rest under the first wheel heights, or from the first 0.2 s of z, pitch, roll"),
     h("table", { className: "filters" },
-      h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Low-pass"),
+      h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "What counts"),
         h("th", { scope: "col" }, "Hz; empty: none"))),
       h("tbody", {}, FILTERS.map(([key, name, what]) => {
         const field = h("input", {
           type: "number", min: "0", step: "any", value: settings[key] ?? "",
-          "aria-label": `Low-pass of the ${what}, Hz; empty for none`,
+          "aria-label": `${what}, Hz; empty for none`,
           on: { change: () => {
             const hertz = field.value === "" ? null : Number(field.value);
             if (hertz === null || Number.isFinite(hertz)) change({ [key]: hertz });
