@@ -132,11 +132,29 @@ export const forgetManoeuvre = (id) => json("DELETE", `${base}/measurements/${id
 const attach = (id, what, file) =>
   json("PUT", `${base}/measurements/${id}/${what}`, { body: inForm(file) });
 export const originalUrl = (id) => `${base}/measurements/${id}/original`;
-export function measurement(id, channelNames, maxSamples, decimate = "stride") {
-  const query = new URLSearchParams({ max_samples: maxSamples, decimate });
+export function measurement(id, channelNames, maxSamples, decimate = "stride", conditioned = true) {
+  const query = new URLSearchParams({ max_samples: maxSamples, decimate, conditioned });
   if (channelNames) query.set("channels", channelNames.join(","));
   return frames("GET", `${base}/measurements/${id}/frames?${query}`, { accept: FRAMES });
 }
+
+// Columns as channels
+export const columns = (id) => json("GET", `${base}/measurements/${id}/columns`);
+/** Least and greatest values of one column, in the file's numbers. */
+export const columnPreview = async (id, index, points) =>
+  (await json("GET", `${base}/measurements/${id}/columns/preview?index=${index}&points=${points}`))[0];
+export const setMapping = (id, mapping) =>
+  json("PUT", `${base}/measurements/${id}/mapping`, { body: mapping });
+export const mappings = () => json("GET", `${base}/mappings`);
+export const keepMapping = (name, mapping) =>
+  json("POST", `${base}/mappings`, { body: { name, mapping } });
+export const deleteMapping = (name) =>
+  json("DELETE", `${base}/mappings/${encodeURIComponent(name)}`);
+
+// What is done to a recording before it is used
+export const conditioning = (id) => json("GET", `${base}/measurements/${id}/conditioning`);
+export const setConditioning = (id, steps) =>
+  json("PUT", `${base}/measurements/${id}/conditioning`, { body: { steps } });
 
 // Jobs of a kind: "identifications", "profiles", "validations" or "campaigns"
 export const submit = (kind, body) => json("POST", `${base}/${kind}`, { body });

@@ -34,8 +34,8 @@ export function saveFile(content, name) {
 export const fileName = (text) =>
   text.replace(/\.\w+$/, "").replace(/\W+/g, "-").toLowerCase().slice(0, 60) || "ridetune";
 
-/** A file name that may break after its underscores. */
-export const breakable = (name) => name.split(/(?<=[_-])/).flatMap((part) => [part, h("wbr")]);
+/** A file's or a column's name that may break after its underscores, and the latter at its dots. */
+export const breakable = (name) => name.split(/(?<=[_-]|\w\.(?=\w))/).flatMap((part) => [part, h("wbr")]);
 
 /** A parameter's symbol such as `K_F` or `phi_R`, with its index set low. */
 export function symbol(text) {

@@ -18,6 +18,7 @@ import * as comfort from "./comfort.js";
 import * as controls from "./controls.js";
 import { $, debounced, tabs } from "./dom.js";
 import * as identification from "./identification.js";
+import * as intake from "./intake.js";
 import * as measurements from "./measurements.js";
 import { banner, listenToKeys, notice, refused } from "./notices.js";
 import * as profile from "./profile.js";
@@ -52,7 +53,7 @@ async function start() {
   units.learn(channels, parameters);
   const { vehicle, measurements: rows } = session;
   const baseline = session.baseline ?? vehicle;
-  set({ parameters, vehicles, manoeuvres, plants, formats, roads, rimsSettings, vehicle, baseline,
+  set({ parameters, channels, vehicles, manoeuvres, plants, formats, roads, rimsSettings, vehicle, baseline,
     measurements: rows });
   const usable = rows.find((row) => row.usable_for_identification);
   set({
@@ -80,6 +81,7 @@ function build() {
   charts.build(() => want("now", "reference"));
   bands.build();
   comfort.build();
+  intake.build();
   measurements.build({
     open: () => select("tab-measurements"), takeVehicle: car.load, campaign: campaign.build(),
   });

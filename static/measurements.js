@@ -1,20 +1,19 @@
 // Measured rides: add by button or by dropping files, with notes on their noise and with what was
-// driven; look, delete.
+// driven; see how far each is on its way from file to run; look, delete.
 
 import * as api from "./api.js";
 import { $, breakable, h, inPlace } from "./dom.js";
+import { RECORDINGS, kindOfJson, requireNotes } from "./file_kinds.js";
+import * as intake from "./intake.js";
 import { lacks, nameOf, original } from "./names.js";
 import { sentence } from "./noise.js";
 import { notice } from "./notices.js";
 import { AXIS, COLOURS, fitWidth } from "./plots.js";
 import { choose } from "./ride.js";
 import { settled } from "./simulation.js";
+import { nextStage, stagesOf, stepper } from "./stages.js";
 import { get, on, set } from "./store.js";
 import * as units from "./units.js";
-
-/** Names of what the service reads, as in engine/formats/readers.py; the content decides. */
-const RECORDINGS = ".csv,.txt,.tsv,.dat,.asc,.mf4,.mdf,.mf3,.mat,.h5,.hdf5,.hdf,.tdms,.uff,.unv,.uf58,"
-  + ".rsp,.rpc,.tim,.drv,.parquet,.erg,.zip,text/csv";
 
 const PREVIEW_SAMPLES = 1500;
 
@@ -65,18 +64,37 @@ const BESIDE = {
 };
 const beside = ({ name }) => Object.values(BESIDE).find(({ end }) => end.test(name));
 
-/** Another JSON file is a vehicle; all else belongs here. */
-function sort(files) {
-  const isVehicle = (file) => /\.json$/i.test(file.name) && !beside(file);
-  files.filter(isVehicle).forEach(hooks.takeVehicle);
-  const ours = files.filter((file) => !isVehicle(file));
-  if (!ours.length) return;
+/** A vehicle is for the car; all else belongs here. */
+async function sort(files) {
+  const ours = [], refusals = [];
+  for (const file of files) {
+    if (!/\.json$/i.test(file.name) || beside(file)) {
+      ours.push(file);
+      continue;
+    }
+    try {
+      const { kind, data } = await kindOfJson(file);
+      if (kind === "vehicle") hooks.takeVehicle(file);
+      else await keepMapping(file, data);
+    } catch (error) {
+      if (error.lost) set({ online: false });
+      refusals.push({ name: file.name, error });
+    }
+  }
+  if (!ours.length && !refusals.length) return;
   hooks.open();
-  add(ours);
+  add(ours, refusals);
 }
 
-async function add(files) {
-  failures = [];
+/** A mapping file becomes a template. */
+async function keepMapping({ name }, data) {
+  const stem = name.replace(/\.json$/i, "");
+  await api.keepMapping(stem, data);
+  notice("info", `${name} is kept as the mapping ${stem}`, "It is proposed for files with its columns.");
+}
+
+async function add(files, refusals) {
+  failures = refusals;
   // What lies beside recordings comes after those that it may belong to.
   for (const file of [...files].sort((one, other) => Boolean(beside(one)) - Boolean(beside(other)))) {
     parts.busy = file.name;
@@ -106,13 +124,20 @@ async function take(file) {
   set({ measurements: [...get("measurements"), row] });
   selected = row.id;
   const { length } = row.warnings;
-  const fit = row.usable_for_identification
-    ? `${units.number(row.duration, 3)} s, with all that an identification needs`
-    : lacks(row);
-  notice(length || !row.usable_for_identification ? "warning" : "info", `${nameOf(row.id)} is in`,
+  if (nextStage(row) !== "ready") {
+    const stage = nextStage(row);
+    parts.told = notice("warning", `${nameOf(row.id)} is in`, `${lacks(row)}.`,
+      { label: TO_DO[stage], run: () => { hooks.open(); show(); intake.open(row.id, stage); } });
+    return;
+  }
+  const fit = `${units.number(row.duration, 3)} s, with all that an identification needs`;
+  notice(length ? "warning" : "info", `${nameOf(row.id)} is in`,
     length ? `${fit}; but what was found in it raises doubts.` : `${fit}.`,
     length ? { label: `See ${warned(length)}`, run: () => showWarnings(row.id) } : null);
 }
+
+/** The next thing to do, by stage. */
+const TO_DO = { channels: "Map columns", conditioning: "Condition" };
 
 const warned = (count) => `${count} warning${count > 1 ? "s" : ""}`;
 
@@ -128,6 +153,7 @@ function showWarnings(id) {
 
 /** It tells of NAME.csv, of the newest where several are called so. */
 async function attach(file, { end, attach: send, told, say }) {
+  if (told === "noise") await requireNotes(file);
   const stem = file.name.replace(end, "");
   const row = get("measurements").findLast(({ name }) => name.replace(/\.\w+$/, "") === stem);
   if (!row) {
@@ -172,8 +198,8 @@ function show() {
       h("div", { className: "problem", role: "alert" },
         h("strong", {}, `${name} was not taken`), h("p", {}, error.message))),
     ...(rows.length ? [table(rows)] : [h("p", { className: "empty" },
-      "No measurement yet. Add a CSV file whose header names channels and units, such as " +
-      "“time [s],chassis.z [mm],wheel.fl.z [mm]”.")]),
+      "No measurement yet. Add a recording: CSV, MDF, MAT, HDF5, TDMS, UFF58, RPC III, Parquet or " +
+      "CarMaker ERG. Its columns may have any names; the page helps to map them to channels.")]),
   ));
   detail(rows.find(({ id }) => id === selected));
 }
@@ -181,13 +207,14 @@ function show() {
 function table(rows) {
   return h("ul", { className: "pick" }, rows.map((row) => {
     const channels = row.channels.filter(({ name }) => name !== "time").length;
+    const size = row.needs_mapping ? `${row.samples.toLocaleString("en")} sample${row.samples === 1 ? "" : "s"}`
+      : `${units.number(row.duration, 3)} s, every ${units.number(1000 * row.sample_step, 3)} ms, ${channels} channels`;
     return h("li", {}, h("button", {
       type: "button", "aria-pressed": row.id === selected,
       on: { click: () => { selected = row.id; show(); } },
     },
     h("span", { className: "name" }, breakable(nameOf(row.id))),
-    h("span", { className: "soft" }, `${units.number(row.duration, 3)} s, every ` +
-      `${units.number(1000 * row.sample_step, 3)} ms, ${channels} channels, ${origin(row)} `, badges(row))));
+    h("span", { className: "soft" }, `${size}, ${origin(row)} `, badges(row))));
   }));
 }
 
@@ -199,17 +226,29 @@ function origin(row) {
     : `added ${new Date(row.created).toLocaleString([], { dateStyle: "short", timeStyle: "short" })}`;
 }
 
+/** What is doubtful in a file; that its columns are not mapped is no doubt, and comes first. */
+const doubtsOf = ({ needs_mapping: unmapped, warnings }) => (unmapped ? warnings.slice(1) : warnings);
+
 function badges(row) {
   const out = [];
-  if (row.warnings.length) {
-    out.push(h("span", { className: "badge warn", title: row.warnings.join("\n") },
-      warned(row.warnings.length)));
+  const doubts = doubtsOf(row);
+  if (doubts.length) {
+    out.push(h("span", { className: "badge warn", title: doubts.join("\n") }, warned(doubts.length)));
   }
-  if (!row.usable_for_identification) {
-    out.push(h("span", { className: "badge", title: `${lacks(row)}.` },
-      "not for fitting"));
+  if (row.needs_mapping) {
+    out.push(h("span", { className: "badge to-do", title: `${lacks(row)}.` }, "needs mapping"));
+  } else if (!row.usable_for_identification) {
+    out.push(h("span", { className: "badge", title: `${lacks(row)}.` }, "not for fitting"));
   }
-  return out;
+  const signs = row.sign_suggestions.length;
+  if (signs) {
+    out.push(h("span", { className: "badge to-do", title: row.sign_suggestions.map(({ sentence }) => sentence).join("\n") },
+      `check ${signs} sign${signs > 1 ? "s" : ""}`));
+  }
+  if (row.conditioning) {
+    out.push(h("span", { className: "badge", title: row.conditioning.map(({ kind }) => kind).join(", ") }, "conditioned"));
+  }
+  return out.flatMap((badge) => [badge, " "]);
 }
 
 function detail(row) {
@@ -220,31 +259,43 @@ function detail(row) {
     return;
   }
   const names = row.channels.map(({ name }) => name).filter((name) => name !== "time");
+  const stage = nextStage(row);
+  const work = (key) => {
+    parts.told?.remove();
+    intake.open(row.id, key);
+  };
   const choice = h("select", { "aria-label": "Channel to look at" },
     names.map((name) => h("option", { value: name }, units.channel(name).label)));
   const drawing = h("div", { className: "preview" });
   const facts = h("p", { className: "hint" });
   choice.addEventListener("change", () => look(row, choice.value, drawing, facts));
-  parts.detail.replaceChildren(
+  parts.detail.replaceChildren(...[
     h("div", { className: "row-tools" },
       h("strong", { className: "name" }, breakable(nameOf(row.id))),
+      stage === "ready" ? null : h("button", { type: "button", className: "primary", id: "next-stage",
+        on: { click: () => work(stage) } }, stage === "channels" && row.mapping ? "Check signs" : TO_DO[stage]),
       row.usable_for_identification
-        ? h("button", { type: "button", on: { click: () => choose(`measurement ${row.id}`) } },
-            "Use as ride")
+        ? h("button", { type: "button", className: stage === "ready" ? "primary" : "",
+            on: { click: () => choose(`measurement ${row.id}`) } }, "Use as ride")
         : null,
+      row.needs_mapping || stage === "channels" ? null
+        : h("button", { type: "button", on: { click: () => work("channels") } }, "Mapping"),
+      row.needs_mapping || stage === "conditioning" ? null
+        : h("button", { type: "button", on: { click: () => work("conditioning") } }, "Conditioning"),
       h("a", { className: "button", href: api.originalUrl(row.id), download: row.name }, "Download"),
       h("button", { type: "button", className: "danger", on: { click: (event) => remove(row, event) } },
         "Delete")),
-    h("div", { className: "row-tools" }, choice, facts),
-    drawing,
+    stepper(row, work),
+    stage === "ready" ? null
+      : h("p", { className: "hint" }, stagesOf(row).find(({ key }) => key === stage).told),
+    ...(names.length ? [h("div", { className: "row-tools" }, choice, facts), drawing] : []),
     h("p", { className: "hint" }, sentence(row)),
     h("p", { className: "hint" }, driven(row), row.manoeuvre
       ? [" ", h("button", { type: "button", title: "It was another road, or another drive",
         on: { click: () => forget(row) } }, "Forget")] : null),
-    ...(row.warnings.length
-      ? [h("ul", { className: "warnings", tabIndex: -1 }, row.warnings.map((text) => h("li", {}, text)))] : []),
-    ...(row.usable_for_identification ? [] : [h("p", { className: "hint" }, `${lacks(row)}.`)]),
-  );
+    ...(doubtsOf(row).length
+      ? [h("ul", { className: "warnings", tabIndex: -1 }, doubtsOf(row).map((text) => h("li", {}, text)))] : []),
+  ].filter(Boolean));
   if (names.length) look(row, choice.value, drawing, facts);
 }
 

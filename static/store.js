@@ -2,6 +2,7 @@
 //
 //   session      its id
 //   parameters   rows of /api/parameters
+//   channels     rows of /api/channels
 //   vehicle      the session's vehicle, with the sliders' values in it
 //   baseline     the vehicle that the sliders are compared with
 //   values       {parameter name: SI value}, the sliders

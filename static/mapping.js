@@ -1,0 +1,380 @@
+// Columns of a file as channels: what is guessed and why, corrected by a person, applied, kept.
+
+import * as api from "./api.js";
+import { breakable, h, inPlace } from "./dom.js";
+import * as detail from "./mapping_detail.js";
+import {
+  BY_HAND, USUAL_UNITS, columnsOf, doubt, entriesOf, entryFor, needs, offered,
+} from "./mapping_entries.js";
+import { get } from "./store.js";
+import * as templates from "./mapping_templates.js";
+import * as units from "./units.js";
+
+/** Rows shown at once; the filter finds the others. */
+const MOST_ROWS = 200;
+
+let host = null;
+/** What is on show: row, columns, entries, selected, filter, onlyMapped, shown, longest_gap, step. */
+let at = null;
+const parts = {};
+
+/** The view of a recording's columns. */
+export async function open(row, itsHost) {
+  host = itsHost;
+  const [found, kept] = await Promise.all([api.columns(row.id), api.mappings()]);
+  const begin = found.mapping ?? found.proposed;
+  at = { row, ...found, kept, shown: MOST_ROWS, filter: "", onlyMapped: false, outcome: null };
+  take(begin);
+  at.applied = Boolean(found.mapping);
+  const first = found.columns.find((one) => at.entries.has(one.index) && doubt(at.entries.get(one.index), one))
+    ?? found.columns.find(({ index }) => at.entries.has(index)) ?? found.columns[0];
+  at.selected = first.index;
+  build();
+  show();
+  return parts.view;
+}
+
+/** What needs its place on the page. */
+export function shown() {
+  look();
+}
+
+/** Take a mapping for what is on show. */
+function take(mapping) {
+  const { entries, lost } = entriesOf(mapping, at.columns);
+  Object.assign(at, { entries, lost, longest_gap: mapping.longest_gap, step: mapping.step, applied: false });
+}
+
+function build() {
+  parts.head = h("div", { className: "mapping-head" });
+  parts.rows = h("tbody");
+  parts.more = h("p", { className: "hint" });
+  parts.side = h("aside", { className: "mapping-side scrolls", "aria-label": "The column that is looked at" });
+  parts.needs = h("ul", { className: "needs", "aria-label": "What an identification needs" });
+  const filter = h("input", { type: "text", id: "column-filter", placeholder: "Find columns",
+    "aria-label": "Find columns by name, group, unit or channel",
+    on: { input: () => { Object.assign(at, { filter: filter.value, shown: MOST_ROWS }); rows(); } } });
+  const only = h("input", { type: "checkbox", id: "only-mapped",
+    on: { change: () => { at.onlyMapped = only.checked; rows(); } } });
+  parts.count = h("span", { className: "hint" });
+  parts.numbers = [number("Bridge gaps up to", "longest_gap", 1, "s"), number("Sample every", "step", 1e3, "ms", "finest")];
+  parts.forget = h("button", { type: "button", on: { click: forget } }, "Forget mapping");
+  parts.apply = h("button", { type: "button", id: "apply-mapping", on: { click: () => apply().then(show) } }, "Apply");
+  parts.next = h("span");
+  host.tools(...parts.numbers.map(({ element }) => element), parts.forget, parts.apply, parts.next);
+  parts.view = h("div", { className: "mapping" },
+    parts.head,
+    h("div", { className: "mapping-bar" }, filter, h("label", { className: "inline" }, only, "only mapped"),
+      parts.count, h("span", { className: "grow" }), templates.build(host, at, {
+        take: (mapping, said) => { take(mapping); host.changed(true); host.say("doubt", ...said); show(); },
+        mapping: whole,
+        reload: async () => { Object.assign(at, await api.columns(at.row.id)); },
+      })),
+    h("div", { className: "mapping-table scrolls" },
+      h("table", {},
+        h("thead", {}, h("tr", {}, ["Column", "File's unit", "Samples", "Range", "Channel", "Unit taken",
+          "Sign", "Sure", "Why"].map((text) => h("th", { scope: "col" }, text)))),
+        parts.rows),
+      parts.more, lists()),
+    parts.side, parts.needs);
+}
+
+/** Units to choose from, by quantity. */
+const lists = () => Object.entries(USUAL_UNITS).map(([quantity, known]) =>
+  h("datalist", { id: `units-${quantity.replace(" ", "-")}` }, known.map((value) => h("option", { value }))));
+
+function show() {
+  head();
+  rows();
+  told();
+  for (const one of parts.numbers) one.refresh();
+  if (parts.side.isConnected) look();
+}
+
+/** What is known of the file as a whole, and what came of applying the mapping. */
+function head() {
+  const { kind, columns, outcome, warnings } = at;
+  const groups = new Set(columns.map(({ group }) => group)).size;
+  const said = outcome ? outcome.warnings : warnings;
+  parts.head.replaceChildren(
+    h("p", { className: "hint" }, `${kind}, ${columns.length} column${columns.length === 1 ? "" : "s"}` +
+      `${groups > 1 ? ` in ${groups} groups` : ""}. ${clocks()}`),
+    ...(outcome ? [h("p", { className: "strong" }, `Applied: ${outcome.channels.length} channels, ` +
+      `${units.number(outcome.duration, 3)} s, a sample every ${units.number(1000 * outcome.sample_step, 3)} ms.`)] : []),
+    ...(outcome?.sign_suggestions.length ? [h("ul", { className: "warnings signs" },
+      outcome.sign_suggestions.map(signRow))] : []),
+    ...(said.length ? [h("details", { className: "fold", open: said.length < 4 && !outcome?.sign_suggestions.length },
+      h("summary", {}, `${said.length} warning${said.length > 1 ? "s" : ""}`),
+      h("ul", { className: "warnings" }, said.map((text) => h("li", {}, text))))] : []));
+}
+
+function signRow({ channel, sentence }) {
+  return h("li", {}, h("span", { className: "grow" }, sentence),
+    h("button", { type: "button", "aria-label": `Flip ${channel}`, on: { click: () => flip(channel) } }, "Flip"));
+}
+
+async function flip(channel) {
+  const [index, entry] = [...at.entries].find(([, one]) => one.channel === channel);
+  at.entries.set(index, { ...entry, sign: -entry.sign });
+  if (!(await apply())) at.entries.set(index, entry);
+  show();
+}
+
+/** Which clock the run will have, where the columns have several. */
+function clocks() {
+  const found = new Map();
+  for (const [index, { channel }] of at.entries) {
+    const clock = clockOf(at.columns[index]);
+    if (channel !== "time" && clock) found.set(clock.key, clock);
+  }
+  if (found.size < 2) return "";
+  const [finest] = [...found.values()].sort((one, other) => one.step - other.step);
+  return `The mapped columns have ${found.size} clocks; the run takes ` +
+    `${at.step ? `a sample every ${units.plain(1000 * at.step)} ms` : `the finest, ${finest.told}`}, ` +
+    "and the others are interpolated to it.";
+}
+
+const SECONDS = { s: 1, ms: 1e-3, us: 1e-6, "µs": 1e-6, min: 60 };
+
+/** {key, step, told} of the clock that the file tells of a column, or null; `step` is in s. */
+function clockOf({ clock, step, samples, group }) {
+  if (clock === null) {
+    return step === null ? null
+      : { key: `step ${step} ${samples}`, step, told: every(step) + (group ? `, as in ${group}` : "") };
+  }
+  const { name, unit, minimum, maximum } = at.columns[clock];
+  const factor = SECONDS[at.entries.get(clock)?.unit ?? (unit || "s")];
+  const mean = minimum === null || samples < 2 || !factor ? Infinity : factor * (maximum - minimum) / (samples - 1);
+  return { key: `column ${clock}`, step: mean,
+    told: `${name}${group ? ` of ${group}` : ""}${mean < Infinity ? `, ${every(mean)}` : ""}` };
+}
+
+const every = (step) => `every ${units.plain(1000 * step, 4)} ms`;
+
+function rows() {
+  const words = at.filter.toLowerCase().split(/\s+/).filter(Boolean);
+  const fitting = at.columns.filter(({ index, name, group, unit }) => {
+    const channel = at.entries.get(index)?.channel ?? "";
+    if (at.onlyMapped && !channel) return false;
+    const text = `${name} ${group} ${unit} ${channel}`.toLowerCase();
+    return words.every((word) => text.includes(word));
+  });
+  // What is mapped comes first where there is more than a screen of columns.
+  if (at.columns.length > 30) {
+    fitting.sort((one, other) => at.entries.has(other.index) - at.entries.has(one.index) || one.index - other.index);
+  }
+  inPlace(parts.rows, () => parts.rows.replaceChildren(...fitting.slice(0, at.shown).map(rowOf)));
+  const left = fitting.length - at.shown;
+  parts.more.replaceChildren(...(left > 0
+    ? [`${left} more; find them by a part of their name, or `,
+       h("button", { type: "button", on: { click: () => { at.shown += MOST_ROWS; rows(); } } }, "show more")]
+    : fitting.length ? [] : ["No column is like that."]));
+}
+
+/** A row whose controls stay while what they say is refreshed, so that no click on them is lost. */
+function rowOf(column) {
+  const { index, name, group, unit, samples } = column;
+  const numbers = h("td", { className: "range" });
+  const channel = channelSelect(column);
+  const unitTaken = unitField(column), sign = signButton(column);
+  const certain = h("td"), why = h("td", { className: "why" });
+  const row = h("tr", { dataset: { index }, on: { click: () => select(index), focusin: () => select(index) } },
+    h("th", { scope: "row" },
+      h("button", { type: "button", className: "link", title: "Look at this column" }, breakable(name)),
+      group ? h("span", { className: "group" }, breakable(group)) : null),
+    h("td", { className: "left" }, unit || h("span", { className: "soft" }, "none")),
+    h("td", {}, samples.toLocaleString("en")),
+    numbers, h("td", { className: "left" }, channel.element), h("td", {}, unitTaken.element),
+    h("td", {}, sign.element), certain, why);
+  row.refresh = () => {
+    const entry = at.entries.get(index);
+    const doubts = entry ? doubt(entry, column) : "";
+    row.className = [entry ? "" : "off", doubts ? "doubted" : "", index === at.selected ? "looked-at" : ""].join(" ");
+    for (const control of [channel, unitTaken, sign]) control.refresh(entry);
+    numbers.replaceChildren(...[range(column), standIns(column, entry)].flat().filter(Boolean));
+    certain.replaceChildren(entry ? sure(entry) : "");
+    why.replaceChildren(...(entry
+      ? [doubts ? h("strong", { className: "doubt" }, `⚠ ${doubts}: `) : "", entry.note]
+      : [hintOf(column)]));
+  };
+  row.refresh();
+  return row;
+}
+
+const hintOf = ({ candidates: [first], constant }) => h("span", { className: "soft" },
+  first ? `perhaps ${first.channel}, ${percent(first.confidence)}` : constant ? "never changes" : "");
+const percent = (share) => `${Math.round(100 * share)} %`;
+
+function range({ minimum, maximum, constant, gaps }) {
+  if (minimum === null) return h("span", { className: "soft" }, "not read");
+  return [constant ? units.number(minimum, 3) : `${units.number(minimum, 3)} … ${units.number(maximum, 3)}`,
+    gaps ? h("span", { className: "group" }, `${gaps} without a number`) : null];
+}
+
+function standIns(column, entry) {
+  const { stand_ins: found, name } = column;
+  if (!found.length || !entry) return null;
+  const values = found.map(({ value }) => value);
+  const box = h("input", { type: "checkbox", checked: values.every((value) => entry.missing?.includes(value)),
+    "aria-label": `Treat ${values.join(", ")} of ${name} as gaps`,
+    on: { change: () => edit(column, { missing: box.checked ? values : [] }) } });
+  return h("label", { className: "stand-in",
+    title: found.map(({ value, samples }) => `${value} in ${samples} samples, far outside the rest`).join("; ") },
+  box, `${values.map((value) => units.plain(value)).join(", ")} as gaps`);
+}
+
+function channelSelect(column) {
+  const option = (name, text) => h("option", { value: name, title: units.channel(name).sign ?? "" }, text);
+  const named = (name) => `${name} · ${units.channel(name).label}`;
+  const seen = new Set(column.candidates.map(({ channel }) => channel));
+  const likely = column.candidates.map(({ channel, confidence }) =>
+    option(channel, `${named(channel)}, ${percent(confidence)}`));
+  const element = h("select", { "aria-label": `Channel of ${column.name}`,
+    on: { change: () => choose(column, element.value) } },
+  h("option", { value: "" }, "not used"),
+  likely.length ? h("optgroup", { label: "Likely" }, likely) : null,
+  offered(get("channels").map(({ name }) => name)).map(([label, group]) => h("optgroup", { label },
+    group.filter((name) => !seen.has(name)).map((name) => option(name, named(name))))));
+  return { element, refresh: (entry) => {
+    element.value = entry?.channel ?? "";
+    // Points of the chassis are the user's own, and so are their names.
+    if (entry && element.value !== entry.channel) {
+      element.append(option(entry.channel, entry.channel));
+      element.value = entry.channel;
+    }
+  } };
+}
+
+function choose(column, channel) {
+  const lost = [...at.entries].find(([index, one]) => one.channel === channel && index !== column.index);
+  if (lost) at.entries.delete(lost[0]);
+  if (channel) at.entries.set(column.index, entryFor(column, channel));
+  else at.entries.delete(column.index);
+  touched(column.index, lost?.[0]);
+  if (lost) host.say("doubt", `${at.columns[lost[0]].name} is not ${channel} any more, since ${column.name} is.`);
+}
+
+function unitField(column) {
+  const element = h("input", { type: "text", className: "unit-taken", spellcheck: false,
+    "aria-label": `Unit of ${column.name}`,
+    on: { change: () => edit(column, { unit: element.value.trim() }) } });
+  return { element, refresh: (entry) => {
+    element.hidden = !entry;
+    if (!entry) return;
+    element.value = entry.unit;
+    const { quantity } = units.channel(entry.channel);
+    if (quantity in USUAL_UNITS) element.setAttribute("list", `units-${quantity.replace(" ", "-")}`);
+    else element.removeAttribute("list");
+  } };
+}
+
+function signButton(column) {
+  const element = h("button", { type: "button", className: "sign", "aria-label": `Turn ${column.name} over`,
+    on: { click: () => edit(column, { sign: -at.entries.get(column.index).sign }) } });
+  return { element, refresh: (entry) => {
+    element.hidden = !entry;
+    if (!entry) return;
+    element.setAttribute("aria-pressed", entry.sign < 0);
+    element.textContent = entry.sign < 0 ? "−" : "+";
+    element.title = `${entry.sign < 0 ? "Turned over" : "As in the file"}; ${entry.channel} is positive ` +
+      `${units.channel(entry.channel).sign ?? "as it is"}`;
+  } };
+}
+
+const sure = ({ confidence }) => confidence === null
+  ? h("span", { className: "soft" }, "by hand")
+  : h("span", { className: "sure" }, h("span", { className: "sure-bar", style: `--share: ${confidence}` }), percent(confidence));
+
+/** Change the entry of a column; what a person has said of its unit is not doubted. */
+function edit(column, changes) {
+  const before = at.entries.get(column.index);
+  const told = changes.unit !== undefined && changes.unit !== before.unit
+    ? { note: `${BY_HAND}: unit`, confidence: null, doubted: false } : {};
+  at.entries.set(column.index, { ...before, ...changes, ...told });
+  touched(column.index);
+}
+
+/** What is on show is not what is applied; some columns have changed. */
+function touched(...indices) {
+  at.applied = false;
+  host.changed(true);
+  host.say();
+  for (const row of parts.rows.children) if (indices.includes(Number(row.dataset.index))) row.refresh();
+  told();
+  // The focus moves on first, so that it is not lost with what is built anew.
+  setTimeout(() => { if (indices.includes(at.selected)) look(); });
+}
+
+function select(index) {
+  if (index === at.selected) return;
+  at.selected = index;
+  for (const row of parts.rows.children) row.classList.toggle("looked-at", Number(row.dataset.index) === index);
+  look();
+}
+
+/** Show the selected column close up. */
+function look() {
+  const column = at.columns[at.selected];
+  inPlace(parts.side, () => detail.show(parts.side, at.row, column, at.entries.get(column.index), {
+    clock: clockOf(column)?.told ?? "of the column mapped as time",
+    edit: (changes) => edit(column, changes), choose: (channel) => choose(column, channel),
+  }));
+}
+
+/** What is needed still, and what can be done now. */
+function told() {
+  const found = needs(at.entries, at.columns);
+  const lacking = found.some(({ has }) => !has);
+  parts.needs.replaceChildren(h("li", { className: "soft" }, "For fitting:"),
+    ...found.map(({ name, has }) => h("li", { className: has ? "has" : "lacks" },
+      h("span", { "aria-hidden": "true" }, has ? "✓ " : "✗ "), name,
+      h("span", { className: "unseen" }, has ? "" : " is lacking"))),
+    ...(lacking ? [h("li", { className: "soft" }, "What is lacking, conditioning may make of raw sensors.")] : []));
+  parts.forget.hidden = !at.row.mapping;
+  parts.apply.classList.toggle("primary", !at.applied);
+  parts.count.textContent = `${at.entries.size} of ${at.columns.length} mapped`;
+  parts.next.replaceChildren(...[at.applied ? host.next(at.row) : null].filter(Boolean));
+}
+
+function number(label, key, factor, unit, placeholder = "") {
+  const field = h("input", { type: "number", min: "0", step: "any", placeholder,
+    on: { change: () => { at[key] = field.value === "" ? null : Number(field.value) / factor; touched(); } } });
+  const refresh = () => { field.value = at[key] === null || at[key] === undefined ? "" : units.plain(at[key] * factor); };
+  return { element: h("label", { className: "inline" }, label, field, unit), refresh };
+}
+
+/** The mapping on show as the service takes it. */
+function whole() {
+  return { columns: columnsOf(at.entries, at.columns),
+    ...(at.longest_gap === null ? {} : { longest_gap: at.longest_gap }), step: at.step };
+}
+
+async function apply() {
+  host.say("", "Applying …");
+  try {
+    at.row = await api.setMapping(at.row.id, whole());
+  } catch (error) {
+    host.refused(error);
+    return false;
+  }
+  Object.assign(at, { applied: true, outcome: at.row });
+  host.changed(false);
+  host.took(at.row);
+  host.say("", at.row.usable_for_identification ? "It has all that an identification needs."
+    : `It lacks ${at.row.missing.join(", ")}; conditioning may make it of raw sensors.`);
+  return true;
+}
+
+async function forget() {
+  try {
+    const row = await api.forgetMapping(at.row.id);
+    host.took(row);
+    parts.view.replaceWith(await open(row, host));
+    host.changed(false);
+    host.say("", "The file goes by the names of its columns again.");
+    shown();
+  } catch (error) {
+    host.refused(error);
+  }
+}
+
