@@ -8,6 +8,8 @@ import { get, set } from "./store.js";
 import * as units from "./units.js";
 
 const SAMPLES = 1500;
+/** A delay is given, or found against a reference. */
+const EXCLUSIVE = { seconds: "reference", reference: "seconds" };
 
 let host = null;
 /** What is on show: row, raw (names of the channels recorded), suggestion, record, steps, applied (those in force), vehicle (of those), wrong (place of the step that was refused), channel, chosen (by hand). */
@@ -29,7 +31,7 @@ export async function open(row, itsHost) {
   parts.apply = h("button", { type: "button", id: "apply-steps", on: { click: () => apply(at.steps) } }, "Apply");
   parts.undo = h("button", { type: "button", id: "as-recorded", on: { click: () => apply([]) } }, "As recorded");
   parts.next = h("span");
-  host.tools(parts.undo, parts.apply, parts.next);
+  host.tools(parts.undo, parts.next, parts.apply);
   show();
   return h("div", { className: "conditioning" },
     h("div", { className: "conditioning-steps scrolls" }, parts.head, parts.steps, adding()), parts.side);
@@ -129,7 +131,12 @@ function stepRow(told, place) {
       button("×", `Remove: ${named}`, true, () => change(at.steps.filter((_, k) => k !== place)))),
     h("div", { className: "step-fields" }, fieldsOf({ told, place }, known(), (key, value) => {
       const { [key]: _, ...rest } = told;
-      const changed = value === undefined ? rest : { ...told, [key]: value };
+      const other = value === undefined ? null : EXCLUSIVE[key];
+      if (other in rest) {
+        delete rest[other];
+        setTimeout(steps);
+      }
+      const changed = value === undefined ? rest : { ...rest, [key]: value };
       // Field by field: the row stays, so that the focus does.
       Object.keys(told).forEach((name) => delete told[name]);
       Object.assign(told, changed);
@@ -195,7 +202,19 @@ function edited() {
   parts.outcome.replaceChildren(...outcome());
 }
 
+/** The place of the step that a refusal is about; not a number where it names none. */
+const placeIn = (text) => Number(/step\[(\d+)\]/.exec(text)?.[1] ?? /, step (\d+), /.exec(text)?.[1] - 1);
+
 async function apply(wanted) {
+  const [lack] = wanted.flatMap(({ kind, ...told }, place) => KINDS[kind].fields
+    .filter(({ key, form, optional }) => form === "channel" && !optional && !told[key])
+    .map(() => ({ kind, place })));
+  if (lack) {
+    at.wrong = lack.place;
+    steps();
+    host.say("problem", `Step ${lack.place + 1}, ${KINDS[lack.kind].label}: choose its channel.`);
+    return;
+  }
   host.say("", wanted.length ? "Doing the steps …" : "Taking the steps back …");
   parts.apply.disabled = true;
   let found;
@@ -203,7 +222,7 @@ async function apply(wanted) {
     found = await api.setConditioning(at.row.id, wanted);
   } catch (error) {
     host.refused(error);
-    at.wrong = Number(/, step (\d+), /.exec(error.message)?.[1]) - 1;
+    at.wrong = placeIn(error.message);
     steps();
     tools();
     return;

@@ -44,7 +44,7 @@ export const KINDS = {
     fields: [{ key: "position", label: "sensor from CG: x, y, z", form: "numbers", count: 3, unit: "m", untold: [0, 0, 0] },
       NUMBER("rate_cutoff_hz", "rates below", "Hz", 20)] },
   displacement: { label: "Integrate twice", what: "heights from vertical accelerations, in a band",
-    fields: [{ key: "channels", label: "of", form: "channels", all: "none" }, BAND("band_hz", "in the band", [0.3, 50])],
+    fields: [{ key: "channels", label: "of", form: "channels", all: "none", fitting: /^(chassis|wheel\.\w+)\.a_z$/ }, BAND("band_hz", "in the band", [0.3, 50])],
     fresh: { channels: [] } },
   "rim-from-travel": { label: "Wheels from travel", what: "wheel heights by potentiometers, z, pitch and roll",
     fields: [{ key: "corners", label: "of", form: "channels", untold: CORNERS, from: CORNERS, all: "no corner" },
@@ -97,7 +97,7 @@ const FORMS = {
     return element;
   },
   channels(field, value, change, names, label) {
-    const from = field.from ?? [...new Set([...names, ...value ?? []])];
+    const from = field.from ?? [...new Set([...names, ...value ?? []])].filter((name) => !field.fitting || field.fitting.test(name));
     const chosen = new Set(value ?? []);
     const summary = h("summary", { "aria-label": label });
     const told = () => {

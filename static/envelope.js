@@ -35,7 +35,7 @@ export function beforeAndAfter(box, before, after, factor, labels, height = 260)
     Array.from(values, (value) => (Number.isFinite(value) ? value * factor : null))];
   const there = [before, after].filter(Boolean);
   const series = [
-    before && { stroke: COLOURS.measured, width: 2.4, points: { show: false } },
+    before && { stroke: COLOURS.measured, width: after ? 2.4 : 1.2, points: { show: false } },
     after && { stroke: COLOURS.now, width: 1.2, points: { show: false } },
   ].filter(Boolean);
   const data = there.length > 1 ? window.uPlot.join(there.map(table)) : table(there[0]);

@@ -59,9 +59,11 @@ function build() {
   parts.count = h("span", { className: "hint" });
   parts.numbers = [number("Bridge gaps up to", "longest_gap", 1, "s"), number("Sample every", "step", 1e3, "ms", "finest")];
   parts.forget = h("button", { type: "button", on: { click: forget } }, "Forget mapping");
-  parts.apply = h("button", { type: "button", id: "apply-mapping", on: { click: () => apply().then(show) } }, "Apply");
+  parts.apply = h("button", { type: "button", id: "apply-mapping",
+    on: { click: async () => { if (await apply()) show(); } } }, "Apply");
   parts.next = h("span");
-  host.tools(...parts.numbers.map(({ element }) => element), parts.forget, parts.apply, parts.next);
+  // What comes and goes stands left of Apply, which so stays under the hand.
+  host.tools(...parts.numbers.map(({ element }) => element), parts.forget, parts.next, parts.apply);
   parts.view = h("div", { className: "mapping" },
     parts.head,
     h("div", { className: "mapping-bar" }, filter, h("label", { className: "inline" }, only, "only mapped"),
@@ -355,6 +357,7 @@ async function apply() {
     at.row = await api.setMapping(at.row.id, whole());
   } catch (error) {
     host.refused(error);
+    showWrong(error.message);
     return false;
   }
   Object.assign(at, { applied: true, outcome: at.row });
@@ -363,6 +366,15 @@ async function apply() {
   host.say("", at.row.usable_for_identification ? "It has all that an identification needs."
     : `It lacks ${at.row.missing.join(", ")}; conditioning may make it of raw sensors.`);
   return true;
+}
+
+/** Lead to the column that a refusal is about: it names the column or its channel. */
+function showWrong(text) {
+  const [index] = [...at.entries].find(([one, { channel }]) =>
+    text.includes(`${channel}:`) || text.includes(`column ${at.columns[one].name}`)) ?? [];
+  if (index === undefined) return;
+  select(index);
+  [...parts.rows.children].find((row) => Number(row.dataset.index) === index)?.scrollIntoView({ block: "nearest" });
 }
 
 async function forget() {

@@ -6,6 +6,8 @@ import { envelope } from "./envelope.js";
 import * as units from "./units.js";
 
 const POINTS = 600;
+/** How long a column is selected before it is read, ms. */
+const PAUSE = 120;
 
 let plot = null;
 let shown = {};
@@ -17,7 +19,7 @@ let shown = {};
 export function show(panel, row, column, entry, { clock, edit, choose }) {
   const drawing = h("div", { className: "column-plot" });
   const again = shown.row === row.id && shown.index === column.index;
-  shown = { row: row.id, index: column.index, seen: again ? shown.seen : null };
+  if (!again) shown = { row: row.id, index: column.index, seen: null };
   const info = entry && units.channel(entry.channel);
   panel.replaceChildren(...[
     h("h3", {}, breakable(column.name)),
@@ -62,19 +64,26 @@ async function look(drawing, row, column, entry) {
   plot?.destroy();
   plot = null;
   const mine = shown;
+  drawing.replaceChildren(h("p", { className: "hint" }, "Reading …"));
+  let seen;
   try {
-    mine.seen ??= await api.columnPreview(row.id, column.index, POINTS);
+    // Columns that are only passed by are not read.
+    if (!mine.seen) await new Promise((done) => setTimeout(done, PAUSE));
+    if (!drawing.isConnected) return;
+    mine.seen ??= api.columnPreview(row.id, column.index, POINTS);
+    seen = await mine.seen;
   } catch (error) {
-    if (drawing.isConnected) drawing.replaceChildren(h("p", { className: "hint" }, error.message));
+    mine.seen = null;
+    if (error.code === undefined) throw error;
+    drawing.replaceChildren(h("p", { className: "hint" }, error.message));
     return;
   }
   if (!drawing.isConnected) return;
-  const { time_unit: timeUnit } = mine.seen;
-  const unit = entry ? entry.unit : column.unit;
+  drawing.replaceChildren();
   const gaps = new Set(entry?.missing ?? []);
   const without = (values) => values.map((value) => (gaps.has(value) ? null : value));
-  const factor = entry ? entry.sign * entry.gain : 1;
-  plot = envelope(drawing, { time: mine.seen.time, minimum: without(mine.seen.minimum),
-    maximum: without(mine.seen.maximum) }, factor,
-  [timeUnit === "sample" ? "sample" : `time, ${timeUnit}`, units.withUnit(entry?.channel ?? "as in the file", unit, ", ")]);
+  plot = envelope(drawing, { time: seen.time, minimum: without(seen.minimum), maximum: without(seen.maximum) },
+    entry ? entry.sign * entry.gain : 1,
+    [seen.time_unit === "sample" ? "sample" : `time, ${seen.time_unit}`,
+      units.withUnit(entry?.channel ?? "as in the file", entry ? entry.unit : column.unit, ", ")]);
 }
