@@ -18,7 +18,15 @@ from .names import readings
 from .numbers import Statistics
 from .patterns import MEASURES, fits
 from .signs_stated import stated_sign
-from .sizes import TakenUnit, measured_by, plain_unit, taken_unit
+from .sizes import (
+    UPRIGHT,
+    TakenUnit,
+    measured_by,
+    plain_unit,
+    reads_gravity,
+    size_of,
+    taken_unit,
+)
 
 THRESHOLD = 0.45
 """Confidence from which a column is proposed as a channel."""
@@ -85,7 +93,7 @@ def guess(
     twice = _named_twice(columns)
     for index in (*twice, *(clocks if clocks_told else ())):
         candidates[index] = []
-    chosen = _assigned(candidates)
+    chosen = _body_fixed(_assigned(candidates), candidates)
     for index, one in chosen.items():
         rivals = [
             columns[other].name
@@ -149,6 +157,8 @@ def _candidates(column: Column, known: Statistics | None, clock: bool) -> list[C
         )
         for one, (fit, ending) in found.items()
     ]
+    if own is None and known is not None:
+        made = _with_or_without_gravity(made, known)
     likely = [one for one in made if one.confidence >= CANDIDATE]
     return sorted(likely, key=lambda one: -one.confidence)
 
@@ -162,7 +172,24 @@ def _candidate(
     sign, words = stated_sign(info.name, column.comment, column.name)
     if sign < 0:
         reason = f"{reason}; turned over, since it says {words!r}"
+    elif known is not None and _hangs(info, unit.unit, known):
+        sign, reason = -1, f"{reason}; turned over, since it reads gravity as {known.median:.4g}"
     return Candidate(info.name, unit.unit, sign, round(confidence, 3), reason, unit.doubted)
+
+
+def _hangs(info: ChannelInfo, unit: str, known: Statistics) -> bool:
+    """Whether a column is an accelerometer that reads gravity upside down."""
+    return size_of(info.name) is UPRIGHT and known.median < 0.0 and reads_gravity(known, unit)
+
+
+def _with_or_without_gravity(made: Sequence[Candidate], known: Statistics) -> list[Candidate]:
+    """Of a body's vertical acceleration with gravity and without, the one that the numbers are."""
+    with_gravity = next((one for one in made if one.channel == "chassis.body_a_z"), None)
+    if with_gravity is None:
+        return list(made)
+    upright = reads_gravity(known, with_gravity.unit)
+    wrong = "chassis.a_z" if upright else "chassis.body_a_z"
+    return [one for one in made if one.channel != wrong]
 
 
 def _assigned(candidates: Sequence[Sequence[Candidate]]) -> dict[int, Candidate]:
@@ -186,6 +213,26 @@ def _assigned(candidates: Sequence[Sequence[Candidate]]) -> dict[int, Candidate]
         if gain[row, column] > 0.0:
             chosen[rows[row]] = likely[rows[row], names[column]]
     return dict(sorted(chosen.items()))
+
+
+def _body_fixed(
+    chosen: dict[int, Candidate], candidates: Sequence[Sequence[Candidate]]
+) -> dict[int, Candidate]:
+    """With a_x as that of a body-fixed accelerometer, where it stands beside one that reads gravity
+    and a gyro, of which conditioning makes the pitch that takes gravity off.
+    """
+    has = {one.channel for one in chosen.values()}
+    is_raw = {"chassis.body_a_z", "chassis.pitch_rate"} <= has and "chassis.pitch" not in has
+    if not is_raw or "chassis.body_a_x" in has:
+        return chosen
+    for index, one in chosen.items():
+        if one.channel == "chassis.a_x":
+            for other in candidates[index]:
+                if other.channel == "chassis.body_a_x":
+                    why = f"{other.reason}; beside a vertical one that reads gravity"
+                    raw_one = replace(other, reason=why, confidence=one.confidence)
+                    return {**chosen, index: raw_one}
+    return chosen
 
 
 def _named_twice(columns: Sequence[Column]) -> list[int]:

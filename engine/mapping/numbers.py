@@ -56,6 +56,7 @@ class Statistics:
 
     minimum, maximum : nan where no sample is finite
     peak : 99.5 % of the magnitudes lie below it;  swing : of the distances from the median
+    median : of all samples;  level : its magnitude
     step : median difference from sample to sample
     missing : samples that are no finite number
     stand_ins : numbers far outside the rest, stand-ins probably
@@ -67,10 +68,16 @@ class Statistics:
     maximum: float
     peak: float
     swing: float
+    median: float
     step: float
     missing: int
     stand_ins: tuple[StandIn, ...] = ()
     clipped: tuple[float, ...] = ()
+
+    @property
+    def level(self) -> float:
+        """Magnitude of the median."""
+        return abs(self.median)
 
     @property
     def constant(self) -> bool:
@@ -92,15 +99,15 @@ def _statistics(values: Array) -> Statistics:
         finite = finite[~np.isin(finite, [one.value for one in found])]
     if not finite.size:
         nan = math.nan
-        return Statistics(values.size, nan, nan, nan, nan, nan, missing, found)
+        return Statistics(values.size, nan, nan, nan, nan, nan, nan, missing, found)
+    median = float(np.median(finite))
     peak, swing = (
-        float(np.percentile(np.abs(one), CENTRAL[1]))
-        for one in (finite, finite - np.median(finite))
+        float(np.percentile(np.abs(one), CENTRAL[1])) for one in (finite, finite - median)
     )
     step = float(np.median(np.diff(finite))) if finite.size > 1 else math.nan
     low, high = float(finite.min()), float(finite.max())
     return Statistics(
-        *(values.size, low, high, peak, swing, step, missing, found),
+        *(values.size, low, high, peak, swing, median, step, missing, found),
         clipped=tuple(end for end in (low, high) if low < high and _is_clipped(finite, end)),
     )
 

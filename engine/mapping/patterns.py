@@ -49,6 +49,11 @@ PATTERNS = (
     Pattern("chassis.roll", {"angle": 1.0, "": 0.9}, {"roll": 1.0}, _BODY),
     Pattern("chassis.roll", {"angle": 0.9}, {"x": 1.0}, _BODY),
     Pattern("chassis.a_x", {"acceleration": 1.0}, {"x": 1.0, "": 0.5}, {**_BODY, "brake": 0.8}),
+    # Which of the two an acceleration along the car is, the other columns tell.
+    Pattern("chassis.body_a_x", {"acceleration": 0.4}, {"x": 1.0}, _BODY),
+    Pattern("chassis.body_a_y", {"acceleration": 1.0}, {"y": 1.0}, _BODY),
+    Pattern("chassis.body_a_z", {"acceleration": 1.0}, {"z": 1.0}, _BODY),
+    Pattern("chassis.a_z", {"acceleration": 0.9}, {"z": 1.0}, _BODY),
     Pattern("chassis.v_x", {"velocity": 1.0}, {"x": 1.0, "": 0.95}, _BODY),
     Pattern("chassis.x", {"displacement": 1.0}, {"x": 1.0, "": 0.4}, _BODY),
     Pattern("chassis.z_rate", {"velocity": 1.0, "rate": 0.9}, {"z": 1.0}, _BODY),
@@ -56,6 +61,8 @@ PATTERNS = (
     Pattern("chassis.roll_rate", _RATE, {"roll": 1.0}, _BODY),
     Pattern("chassis.roll_rate", {"rate": 1.0}, {"x": 0.9}, _BODY),
     Pattern("wheel.{corner}.z", {**_HEIGHT, "travel": 0.55}, _UP, {"wheel": 1.0, "": 0.55}),
+    Pattern("wheel.{corner}.a_z", {"acceleration": 1.0}, _UP, {"wheel": 1.0, "hub": 1.0}),
+    Pattern("wheel.{corner}.speed", {"velocity": 1.0}, {"": 1.0, "x": 0.9}, {"wheel": 1.0}),
     Pattern(
         "suspension.{corner}.travel",
         {"travel": 1.0, "displacement": 0.95, "": 0.7},

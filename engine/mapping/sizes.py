@@ -18,7 +18,7 @@ from ..units import UnitError, to_si
 from .numbers import Statistics
 from .patterns import MEASURES
 
-Measure = Literal["step", "peak", "swing"]
+Measure = Literal["step", "peak", "swing", "level"]
 
 
 class Size(NamedTuple):
@@ -30,17 +30,26 @@ class Size(NamedTuple):
     most: float
 
 
+UPRIGHT = Size("level", 9.0, 9.81, 10.6)
+"""Of an accelerometer that reads gravity, m/s2, tilted or off by what sensors are."""
+
 SIZES: Mapping[str, Size] = {
     "time": Size("step", 2e-6, 0.01, 0.21),
     "chassis.z": Size("swing", 3e-4, 0.02, 0.45),
     "chassis.pitch": Size("swing", 5e-4, 0.015, 0.35),
     "chassis.roll": Size("swing", 3e-4, 0.015, 0.35),
     "chassis.a_x": Size("swing", 0.03, 2.0, 16.0),
+    "chassis.a_z": Size("swing", 0.03, 2.0, 60.0),
+    "chassis.body_a_x": Size("swing", 0.03, 2.0, 30.0),
+    "chassis.body_a_y": Size("swing", 5e-3, 1.0, 30.0),
+    "chassis.body_a_z": UPRIGHT,
     "chassis.v_x": Size("peak", 0.3, 15.0, 95.0),
     "chassis.x": Size("peak", 0.5, 200.0, 1e6),
     "chassis.z_rate": Size("swing", 3e-3, 0.2, 8.0),
     "chassis.pitch_rate": Size("swing", 1e-3, 0.1, 4.0),
     "chassis.roll_rate": Size("swing", 1e-3, 0.1, 4.0),
+    "wheel.a_z": UPRIGHT,
+    "wheel.speed": Size("peak", 0.3, 15.0, 95.0),
     "wheel.z": Size("swing", 3e-4, 0.02, 0.45),
     "tyre.load": Size("peak", 100.0, 4000.0, 4e4),
     "suspension.travel": Size("swing", 3e-4, 0.02, 0.45),
@@ -176,6 +185,13 @@ def size_of(channel: str) -> Size | None:
     return SIZES.get(channel) or SIZES.get(f"{parts[0]}.{parts[-1]}")
 
 
+def reads_gravity(known: Statistics, unit: str) -> bool:
+    """Whether numbers in a unit of acceleration are those of an upright accelerometer, either way
+    up.
+    """
+    return UPRIGHT.least <= known.level * _scale(unit, "m/s^2") <= UPRIGHT.most
+
+
 def _untested(info: ChannelInfo, stated: str, header: str, said: str, fits: bool) -> TakenUnit:
     """The unit of a column whose numbers say nothing of it."""
     if header:
@@ -204,6 +220,8 @@ def _shown(known: Statistics, measure: Measure) -> str:
     """The numbers that speak, for a sentence."""
     if measure == "step":
         return f"steps of {known.step:.3g}"
+    if measure == "level":
+        return f"values about {known.median:.4g}"
     return f"values to {max(abs(known.minimum), abs(known.maximum)):.4g}"
 
 

@@ -78,6 +78,13 @@ KNOWN_NAMES = [
     ("AccelX", "g", "chassis.a_x"),
     ("SeatDriver_az", "m/s^2", "seat.driver.a_z"),
     ("BrakeTrq_FL", "Nm", "brake.fl.torque"),
+    ("AccY", "g", "chassis.body_a_y"),
+    ("heave acceleration", "m/s^2", "chassis.body_a_z"),
+    ("Wheel Speed FL", "km/h", "wheel.fl.speed"),
+    ("Radgeschwindigkeit HR", "km/h", "wheel.rr.speed"),
+    ("Wheel_FL_az", "m/s^2", "wheel.fl.a_z"),
+    ("HubAcc_Z_RL", "g", "wheel.rl.a_z"),
+    ("Beschleunigung Radträger VR", "g", "wheel.fr.a_z"),
 ]
 
 
@@ -95,17 +102,15 @@ def test_our_own_names_are_themselves(known):
     ("name", "unit"),
     [
         ("Yaw rate", "deg/s"),
+        ("Wheel Speed FL", "rad/s"),
+        ("Wheel_FL_ay", "m/s^2"),
         ("Lenkradwinkel", "deg"),
         ("latitude", "deg"),
-        ("AccY", "g"),
-        ("Wheel Speed FL", "km/h"),
         ("Car.PitchAcc", "rad/s^2"),
         ("Oil temperature", "degC"),
         ("Bremsdruck VL", "bar"),
-        ("Wheel_FL_az", "m/s^2"),
         ("signal 7", "mm"),
         ("", ""),
-        ("heave acceleration", "m/s^2"),
     ],
 )
 def test_other_quantities_are_left_alone(name, unit):
@@ -337,6 +342,40 @@ def test_of_two_columns_that_fit_the_first_is_proposed_and_the_other_named():
     assert "acc_x imu2 fits as well" in found.chosen[1].reason
     assert 2 not in found.chosen
     assert found.candidates[2][0].channel == "chassis.a_x"
+
+
+RAW = {
+    "Accel_X_body": ("g", lambda t: 0.3 * np.sin(t), "chassis.body_a_x"),
+    "Accel_Y_body": ("g", lambda t: 0.1 * np.cos(t), "chassis.body_a_y"),
+    "Accel_Z_body": ("g", lambda t: -1.0 + 0.2 * np.sin(9 * t), "chassis.body_a_z"),
+    "Gyro_Pitch": ("deg/s", lambda t: 5 * np.cos(2 * t), "chassis.pitch_rate"),
+    "HubAcc_Z_FL": ("g", lambda t: 1.0 + 2 * np.sin(30 * t), "wheel.fl.a_z"),
+    "StringPot_FL": ("mm", lambda t: 12 * np.sin(9 * t), "suspension.fl.travel"),
+}
+
+
+def raw_table(*without):
+    time = np.arange(0.0, 10.0, 0.01)
+    columns = {name: (unit, make(time)) for name, (unit, make, _) in RAW.items()}
+    kept = {name: one for name, one in columns.items() if name not in without}
+    return held({"Time": ("s", time), **kept})
+
+
+def test_raw_sensors_are_told_from_inertial_channels_by_gravity():
+    """A vertical accelerometer that reads -1 g stands on its head; what has no mean is inertial."""
+    found = guessed(raw_table())
+    chosen = {one.channel: one for one in found.chosen.values()}
+    assert set(chosen) == {"time", *(name for *_, name in RAW.values())}
+    assert chosen["chassis.body_a_z"].sign == -1
+    assert "reads gravity as -0.99" in chosen["chassis.body_a_z"].reason
+    assert chosen["wheel.fl.a_z"].sign == 1
+    # Without a gyro nothing could take gravity off a_x.
+    alone = {one.channel for one in guessed(raw_table("Gyro_Pitch")).chosen.values()}
+    assert "chassis.a_x" in alone
+    time = np.arange(0.0, 10.0, 0.01)
+    inertial = guessed(held({"Time": ("s", time), "az": ("m/s^2", 2 * np.sin(9 * time))}))
+    assert inertial.chosen[1].channel == "chassis.a_z"
+    assert inertial.chosen[1].sign == 1
 
 
 def test_columns_of_one_name_are_not_told_apart():
