@@ -4,7 +4,7 @@ import * as api from "./api.js";
 import { breakable, h, inPlace } from "./dom.js";
 import * as detail from "./mapping_detail.js";
 import {
-  BY_HAND, USUAL_UNITS, columnsOf, doubt, entriesOf, entryFor, needs, offered,
+  BY_HAND, USUAL_UNITS, columnsOf, doubt, entriesOf, entryFor, isRaw, needs, offered,
 } from "./mapping_entries.js";
 import { get } from "./store.js";
 import * as templates from "./mapping_templates.js";
@@ -190,7 +190,7 @@ function rowOf(column) {
     h("td", {}, sign.element), certain, why);
   row.refresh = () => {
     const entry = at.entries.get(index);
-    const doubts = entry ? doubt(entry, column) : "";
+    const doubts = entry ? doubtOf(column) : "";
     row.className = [entry ? "" : "off", doubts ? "doubted" : "", index === at.selected ? "looked-at" : ""].join(" ");
     for (const control of [channel, unitTaken, sign]) control.refresh(entry);
     numbers.replaceChildren(...[range(column), standIns(column, entry)].flat().filter(Boolean));
@@ -247,13 +247,24 @@ function channelSelect(column) {
   } };
 }
 
+/** Keys on a closed list choose as they pass, so that no other column loses its channel by it. */
 function choose(column, channel) {
-  const lost = [...at.entries].find(([index, one]) => one.channel === channel && index !== column.index);
-  if (lost) at.entries.delete(lost[0]);
+  const before = at.entries.get(column.index)?.channel;
   if (channel) at.entries.set(column.index, entryFor(column, channel));
   else at.entries.delete(column.index);
-  touched(column.index, lost?.[0]);
-  if (lost) host.say("doubt", `${at.columns[lost[0]].name} is not ${channel} any more, since ${column.name} is.`);
+  const others = [...at.entries].filter(([, one]) => [before, channel].includes(one.channel)).map(([index]) => index);
+  touched(column.index, ...others);
+  const [twice] = others.filter((index) => channel && index !== column.index && at.entries.get(index).channel === channel);
+  if (twice !== undefined) {
+    host.say("doubt", `${at.columns[twice].name} is ${channel}, too; keep one of the two.`);
+  }
+}
+
+/** The doubt about the entry of a column, or that its channel is that of another one, too. */
+function doubtOf(column) {
+  const entry = at.entries.get(column.index);
+  const twice = [...at.entries].some(([index, { channel }]) => channel === entry.channel && index !== column.index);
+  return twice ? "channel taken twice" : doubt(entry, column);
 }
 
 function unitField(column) {
@@ -327,11 +338,16 @@ function look() {
 function told() {
   const found = needs(at.entries, at.columns);
   const lacking = found.some(({ has }) => !has);
+  // Of raw sensors conditioning makes what is lacking, as far as it can.
+  const raw = [...at.entries.values()].some(({ channel }) => isRaw(channel) && channel !== "chassis.v_x");
+  const [kind, mark, word] = raw ? ["to-make", "○", "not recorded"] : ["lacks", "✗", "lacking"];
   parts.needs.replaceChildren(h("li", { className: "soft" }, "For fitting:"),
-    ...found.map(({ name, has }) => h("li", { className: has ? "has" : "lacks" },
-      h("span", { "aria-hidden": "true" }, has ? "✓ " : "✗ "), name,
-      h("span", { className: "unseen" }, has ? "" : " is lacking"))),
-    ...(lacking ? [h("li", { className: "soft" }, "What is lacking, conditioning may make of raw sensors.")] : []));
+    ...found.map(({ name, has }) => h("li", { className: has ? "has" : kind },
+      h("span", { "aria-hidden": "true" }, has ? "✓ " : `${mark} `), name,
+      h("span", { className: "unseen" }, has ? "" : `, ${word}`))),
+    ...(lacking ? [h("li", { className: "soft" }, raw
+      ? "○ is for conditioning to make of the raw sensors, which comes next."
+      : "Map columns that hold them, or raw sensors of which conditioning makes them.")] : []));
   parts.forget.hidden = !at.row.mapping;
   parts.apply.classList.toggle("primary", !at.applied);
   parts.count.textContent = `${at.entries.size} of ${at.columns.length} mapped`;
@@ -364,7 +380,7 @@ async function apply() {
   host.changed(false);
   host.took(at.row);
   host.say("", at.row.usable_for_identification ? "It has all that an identification needs."
-    : `It lacks ${at.row.missing.join(", ")}; conditioning may make it of raw sensors.`);
+    : "Conditioning comes next, which makes what a fit lacks of raw sensors.");
   return true;
 }
 

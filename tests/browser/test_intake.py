@@ -83,7 +83,13 @@ def test_a_foreign_csv_is_mapped_corrected_flipped_and_its_mapping_kept(visitor)
     assert page.evaluate("document.activeElement.ariaLabel") == "Turn Radweg VL over"
     assert "set by hand" in row.inner_text()
     unit.fill("mm")
-    assert page.get_by_label("Channel of Öldruck").input_value() == ""
+    # A channel is not taken away from another column in passing.
+    spare = page.get_by_label("Channel of Öldruck")
+    spare.select_option("chassis.z")
+    assert "Aufbauhub is chassis.z, too" in said(visitor)
+    assert page.locator(".doubted", has_text="taken twice").count() == 2
+    spare.select_option("")
+    assert page.locator(".doubted", has_text="taken twice").count() == 0
 
     visitor.click("#apply-mapping")
     flip = page.get_by_role("button", name="Flip chassis.pitch")
