@@ -145,6 +145,7 @@ export const columnPreview = async (id, index, points) =>
   (await json("GET", `${base}/measurements/${id}/columns/preview?index=${index}&points=${points}`))[0];
 export const setMapping = (id, mapping) =>
   json("PUT", `${base}/measurements/${id}/mapping`, { body: mapping });
+export const forgetMapping = (id) => json("DELETE", `${base}/measurements/${id}/mapping`);
 export const mappings = () => json("GET", `${base}/mappings`);
 export const keepMapping = (name, mapping) =>
   json("POST", `${base}/mappings`, { body: { name, mapping } });

@@ -14,7 +14,7 @@ import * as units from "./units.js";
 const MOST_ROWS = 200;
 
 let host = null;
-/** What is on show: row, columns, entries, selected, filter, onlyMapped, shown, longest_gap, step. */
+/** What is on show: row, columns, rows (of the table, by index), entries, selected, filter, onlyMapped, shown, longest_gap, step. */
 let at = null;
 const parts = {};
 
@@ -23,9 +23,9 @@ export async function open(row, itsHost) {
   host = itsHost;
   const [found, kept] = await Promise.all([api.columns(row.id), api.mappings()]);
   const begin = found.mapping ?? found.proposed;
-  at = { row, ...found, kept, shown: MOST_ROWS, filter: "", onlyMapped: false, outcome: null };
+  at = { row, ...found, kept, rows: new Map(), shown: MOST_ROWS, filter: "", onlyMapped: false, outcome: null };
   take(begin);
-  at.applied = Boolean(found.mapping);
+  at.applied = !row.needs_mapping;
   const first = found.columns.find((one) => at.entries.has(one.index) && doubt(at.entries.get(one.index), one))
     ?? found.columns.find(({ index }) => at.entries.has(index)) ?? found.columns[0];
   at.selected = first.index;
@@ -87,6 +87,7 @@ const lists = () => Object.entries(USUAL_UNITS).map(([quantity, known]) =>
 
 function show() {
   head();
+  for (const row of at.rows.values()) row.refresh();
   rows();
   told();
   for (const one of parts.numbers) one.refresh();
@@ -165,7 +166,11 @@ function rows() {
   if (at.columns.length > 30) {
     fitting.sort((one, other) => at.entries.has(other.index) - at.entries.has(one.index) || one.index - other.index);
   }
-  inPlace(parts.rows, () => parts.rows.replaceChildren(...fitting.slice(0, at.shown).map(rowOf)));
+  const shownRows = fitting.slice(0, at.shown).map((column) => {
+    if (!at.rows.has(column.index)) at.rows.set(column.index, rowOf(column));
+    return at.rows.get(column.index);
+  });
+  parts.rows.replaceChildren(...shownRows);
   const left = fitting.length - at.shown;
   parts.more.replaceChildren(...(left > 0
     ? [`${left} more; find them by a part of their name, or `,
@@ -231,17 +236,24 @@ function channelSelect(column) {
   const seen = new Set(column.candidates.map(({ channel }) => channel));
   const likely = column.candidates.map(({ channel, confidence }) =>
     option(channel, `${named(channel)}, ${percent(confidence)}`));
+  // All channels in every row of a long file would make it slow; they come with the focus.
+  const fill = () => {
+    const chosen = element.value;
+    element.append(...offered(get("channels").map(({ name }) => name)).map(([label, group]) =>
+      h("optgroup", { label }, group.filter((name) => !seen.has(name)).map((name) => option(name, named(name))))));
+    element.value = chosen;
+  };
   const element = h("select", { "aria-label": `Channel of ${column.name}`,
     on: { change: () => choose(column, element.value) } },
   h("option", { value: "" }, "not used"),
-  likely.length ? h("optgroup", { label: "Likely" }, likely) : null,
-  offered(get("channels").map(({ name }) => name)).map(([label, group]) => h("optgroup", { label },
-    group.filter((name) => !seen.has(name)).map((name) => option(name, named(name))))));
+  likely.length ? h("optgroup", { label: "Likely" }, likely) : null);
+  for (const event of ["pointerdown", "focus"]) element.addEventListener(event, () => { if (!filled) fill(); filled = true; });
+  let filled = false;
   return { element, refresh: (entry) => {
     element.value = entry?.channel ?? "";
     // Points of the chassis are the user's own, and so are their names.
     if (entry && element.value !== entry.channel) {
-      element.append(option(entry.channel, entry.channel));
+      element.append(option(entry.channel, named(entry.channel)));
       element.value = entry.channel;
     }
   } };
@@ -312,7 +324,7 @@ function touched(...indices) {
   at.applied = false;
   host.changed(true);
   host.say();
-  for (const row of parts.rows.children) if (indices.includes(Number(row.dataset.index))) row.refresh();
+  for (const index of indices) at.rows.get(index)?.refresh();
   told();
   // The focus moves on first, so that it is not lost with what is built anew.
   setTimeout(() => { if (indices.includes(at.selected)) look(); });
@@ -321,7 +333,7 @@ function touched(...indices) {
 function select(index) {
   if (index === at.selected) return;
   at.selected = index;
-  for (const row of parts.rows.children) row.classList.toggle("looked-at", Number(row.dataset.index) === index);
+  for (const [one, row] of at.rows) row.classList.toggle("looked-at", one === index);
   look();
 }
 
@@ -390,7 +402,7 @@ function showWrong(text) {
     text.includes(`${channel}:`) || text.includes(`column ${at.columns[one].name}`)) ?? [];
   if (index === undefined) return;
   select(index);
-  [...parts.rows.children].find((row) => Number(row.dataset.index) === index)?.scrollIntoView({ block: "nearest" });
+  at.rows.get(index)?.scrollIntoView({ block: "nearest" });
 }
 
 async function forget() {
