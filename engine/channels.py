@@ -87,38 +87,6 @@ CHANNEL_KINDS: tuple[ChannelInfo, ...] = (
         "forward, inertial",
         largest=20.0,
     ),
-    _row(
-        "chassis.a_z",
-        "m/s^2",
-        "acceleration",
-        "Chassis vertical acceleration",
-        "of the CG, up, inertial",
-        largest=50.0,
-    ),
-    _row(
-        "chassis.body_a_x",
-        "m/s^2",
-        "acceleration",
-        "Body-fixed accelerometer, along",
-        "forward in the body's axes, gravity included",
-        largest=50.0,
-    ),
-    _row(
-        "chassis.body_a_y",
-        "m/s^2",
-        "acceleration",
-        "Body-fixed accelerometer, across",
-        "left in the body's axes, gravity included",
-        largest=50.0,
-    ),
-    _row(
-        "chassis.body_a_z",
-        "m/s^2",
-        "acceleration",
-        "Body-fixed accelerometer, vertical",
-        "up in the body's axes, gravity included: 9.81 at rest",
-        largest=60.0,
-    ),
     _row("chassis.v_x", "m/s", "speed", "Speed", "forward", ("km/h", 3.6), largest=120.0),
     _row("chassis.x", "m", "distance", "Distance travelled", "forward"),
     _row(
@@ -130,23 +98,6 @@ CHANNEL_KINDS: tuple[ChannelInfo, ...] = (
         _MILLI,
         largest=0.5,
         smallest=1e-4,
-    ),
-    _row(
-        "wheel.{corner}.a_z",
-        "m/s^2",
-        "acceleration",
-        "{corner} hub accelerometer, vertical",
-        "up in the wheel carrier's axes, gravity included: 9.81 at rest",
-        largest=1000.0,
-    ),
-    _row(
-        "wheel.{corner}.speed",
-        "m/s",
-        "speed",
-        "{corner} wheel speed",
-        "forward, of the tread",
-        ("km/h", 3.6),
-        largest=120.0,
     ),
     _row(
         "tyre.{corner}.load", "N", "force", "{corner} tyre load", "compression", _KILO, largest=1e5
@@ -275,6 +226,55 @@ CHANNEL_KINDS: tuple[ChannelInfo, ...] = (
         "up, in the chassis's axes",
         _KILO,
     ),
+    _row(
+        "chassis.a_z",
+        "m/s^2",
+        "acceleration",
+        "Chassis vertical acceleration",
+        "of the CG, up, inertial",
+        largest=50.0,
+    ),
+    _row(
+        "chassis.body_a_x",
+        "m/s^2",
+        "acceleration",
+        "Body-fixed accelerometer, along",
+        "forward in the body's axes, gravity included",
+        largest=50.0,
+    ),
+    _row(
+        "chassis.body_a_y",
+        "m/s^2",
+        "acceleration",
+        "Body-fixed accelerometer, across",
+        "left in the body's axes, gravity included",
+        largest=50.0,
+    ),
+    _row(
+        "chassis.body_a_z",
+        "m/s^2",
+        "acceleration",
+        "Body-fixed accelerometer, vertical",
+        "up in the body's axes, gravity included: 9.81 at rest",
+        largest=60.0,
+    ),
+    _row(
+        "wheel.{corner}.a_z",
+        "m/s^2",
+        "acceleration",
+        "{corner} hub accelerometer, vertical",
+        "up in the wheel carrier's axes, gravity included: 9.81 at rest",
+        largest=1000.0,
+    ),
+    _row(
+        "wheel.{corner}.speed",
+        "m/s",
+        "speed",
+        "{corner} wheel speed",
+        "forward, of the tread",
+        ("km/h", 3.6),
+        largest=120.0,
+    ),
 )
 """The rows as documented."""
 
@@ -302,6 +302,15 @@ CHANNELS: Mapping[str, ChannelInfo] = MappingProxyType(
     {info.name: info for row in CHANNEL_KINDS for info in _expanded(row)}
 )
 """Every channel with a fixed name, in the order of the table."""
+
+RAW_CHANNELS: frozenset[str] = frozenset(
+    name
+    for name in CHANNELS
+    if name == "chassis.a_z"
+    or name.startswith("chassis.body_a_")
+    or (name.startswith("wheel.") and not name.endswith(".z"))
+)
+"""What instruments record and no simulation has; `conditioning` makes other channels of them."""
 
 _ORDER = {name: position for position, name in enumerate(CHANNELS)}
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
-from .channels import CHANNELS, Run
+from .channels import CHANNELS, RAW_CHANNELS, Run
 from .errors import SimulationDiverged
 from .manoeuvre import Manoeuvre
 from .output_channels import DEFAULT_POINTS, Points
@@ -95,8 +95,9 @@ class ConceptPlant:
 
     @property
     def channels(self) -> Collection[str]:
-        """All fixed channels but the posts of a rig."""
-        return {one for one in CHANNELS if one != "time" and not one.startswith("post.")}
+        """All fixed channels of a simulation but the posts of a rig."""
+        fixed = {one for one in CHANNELS if one != "time" and not one.startswith("post.")}
+        return fixed - RAW_CHANNELS
 
     def with_points(self, points: Points) -> "ConceptPlant":
         """The same car with accelerometers at further points."""

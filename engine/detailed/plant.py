@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from ..channels import CHANNELS
+from ..channels import CHANNELS, RAW_CHANNELS
 from ..frames import CORNERS
 from ..json_record import record_to_json
 from ..manoeuvre import Manoeuvre
@@ -42,7 +42,8 @@ class DetailedPlant:
     def channels(self) -> Collection[str]:
         """Motion of the chassis, and what there is at each corner."""
         corners = {name.format(corner) for name in AT_CORNERS for corner in CORNERS}
-        return corners | {name for name in CHANNELS if name.startswith("chassis.")}
+        chassis = {name for name in CHANNELS if name.startswith("chassis.")}
+        return corners | chassis - RAW_CHANNELS
 
     def with_points(self, points: Points) -> "DetailedPlant":
         """The same car with accelerometers at further points."""

@@ -2,11 +2,20 @@
 
 import asyncio
 import threading
+from collections.abc import Callable, Coroutine
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import pytest
 from ridetune.app.errors import Busy, Unavailable
 from ridetune.app.interactive import Interactive
 from ridetune.app.settings import Limits
+
+
+def in_a_loop(run: Callable[[], Coroutine[Any, Any, Any]]) -> Any:
+    """What a coroutine returns, in a thread of its own: a browser's loop may run in this one."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(lambda: asyncio.run(run())).result()
 
 
 def test_no_more_runs_at_once_than_the_pool_is_wide():
@@ -26,7 +35,7 @@ def test_no_more_runs_at_once_than_the_pool_is_wide():
     async def run() -> None:
         await asyncio.gather(*(pool.run(f"session {k}", work) for k in range(8)))
 
-    asyncio.run(run())
+    in_a_loop(run)
     pool.close()
     assert most == [2]
 
@@ -45,7 +54,7 @@ def test_a_session_over_its_share_is_refused_and_free_again_afterwards():
         go.set()
         return [await modest, *await asyncio.gather(*first), await pool.run("greedy", lambda: 1)]
 
-    assert asyncio.run(run()) == ["served", True, True, 1]
+    assert in_a_loop(run) == ["served", True, True, 1]
     pool.close()
 
 
@@ -61,7 +70,7 @@ def test_a_full_queue_is_refused_at_once():
         go.set()
         await first
 
-    asyncio.run(run())
+    in_a_loop(run)
     pool.close()
 
 
@@ -73,5 +82,5 @@ def test_an_error_goes_to_its_caller_and_frees_the_place():
             with pytest.raises(ZeroDivisionError):
                 await pool.run("session", lambda: 1 / 0)
 
-    asyncio.run(run())
+    in_a_loop(run)
     pool.close()

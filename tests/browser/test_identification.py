@@ -178,7 +178,7 @@ def test_without_a_measurement_the_page_says_what_to_do(visitor):
             "document.activeElement.closest('.measurement-list') !== null"
         )
         assert where, "the focus stays with the list"
-    assert "Add a CSV file" in visitor.element("#measurements").inner_text()
+    assert "Add a recording: CSV" in visitor.element("#measurements").inner_text()
     visitor.until("ridetune.state('ride').kind === 'manoeuvre' && ridetune.state('now') !== null")
     visitor.click("#identify")
     assert "at least one measured run" in visitor.element("#notices").inner_text()

@@ -68,7 +68,10 @@ def test_braking_is_marked_run_by_run(visitor):
 
 def test_noise_is_typed_or_stated_or_the_default(visitor):
     """Oracle: units by hand; what is typed goes before what a NAME.toml states."""
-    noise = {name: visitor.page.get_by_label(f"Noise of {name}") for name in ("z", "pitch", "roll")}
+    noise = {
+        name: visitor.page.get_by_role("spinbutton", name=f"Noise of {name},")
+        for name in ("z", "pitch", "roll")
+    }
     summary = visitor.page.locator("summary", has_text="Noise")
     visitor.click("#tab-identification")
     assert summary.inner_text() == "Noise: stated"

@@ -192,7 +192,7 @@ def test_a_turned_channel_is_offered_to_be_turned_back(visitor):
     assert offer["channel"] == "chassis.roll"
     first = visitor.look("ridetune.job().id")
     visitor.page.get_by_role("button", name="Apply and fit again").click()
-    visitor.until(f"ridetune.job().id !== '{first}' && ridetune.job().state === 'done'", 150)
+    visitor.until(f"ridetune.state('fitJob').id !== '{first}'", 150)
     fit = visitor.look("ridetune.state('fit')")
     assert fit["offers"] == []
     assert fit["fixed_sensors"] == {"chassis.roll": {"sign": -1}}
