@@ -30,33 +30,17 @@ class Combination:
     signed: bool = False
 
 
-def _bar_rate(axle: AxleName) -> Combination:
-    def value(car: Vehicle) -> float:
-        one = car.axle(axle)
-        return one.stabilizer_bar.stiffness / one.pivot.distance**2
-
+def _bar(axle: AxleName, number: str, letter: str, name: str, unit: str) -> Combination:
+    """What a bar's number comes to at the wheels."""
+    path, distance = f"{axle}.stabilizer_bar.{number}", f"{axle}.pivot.distance"
+    end = axle[0].upper()
     return Combination(
-        name=f"{axle}.bar_rate",
-        symbol=f"Ktor_{axle[0].upper()}/d_{axle[0].upper()}^2",
-        label=f"{axle.capitalize()} stabilizer bar's rate at the wheels",
-        unit="N/m",
-        of=(f"{axle}.stabilizer_bar.stiffness", f"{axle}.pivot.distance"),
-        value=value,
-    )
-
-
-def _bar_damping(axle: AxleName) -> Combination:
-    def value(car: Vehicle) -> float:
-        one = car.axle(axle)
-        return one.stabilizer_bar.damping / one.pivot.distance**2
-
-    return Combination(
-        name=f"{axle}.bar_damping",
-        symbol=f"Ctor_{axle[0].upper()}/d_{axle[0].upper()}^2",
-        label=f"{axle.capitalize()} stabilizer bar's damping at the wheels",
-        unit="N s/m",
-        of=(f"{axle}.stabilizer_bar.damping", f"{axle}.pivot.distance"),
-        value=value,
+        name=f"{axle}.bar_{name}",
+        symbol=f"{letter}_{end}/d_{end}^2",
+        label=f"{axle.capitalize()} stabilizer bar's {name} at the wheels",
+        unit=unit,
+        of=(path, distance),
+        value=lambda car: car.value(path) / car.value(distance) ** 2,
     )
 
 
@@ -130,9 +114,7 @@ def _both_axles(number: str, letter: str, label: str, unit: str) -> Combination:
 COMBINATIONS: tuple[Combination, ...] = (
     _both_axles("stiffness", "K", "Spring stiffness of both axles", "N/m"),
     _both_axles("damping", "C", "Damping of both axles", "N s/m"),
-    *(
-        make(axle)
-        for make in (_bar_rate, _bar_damping, _roll_rate, _traction_slope, _pivot_height)
-        for axle in AXLES
-    ),
+    *(_bar(axle, "stiffness", "Ktor", "rate", "N/m") for axle in AXLES),
+    *(_bar(axle, "damping", "Ctor", "damping", "N s/m") for axle in AXLES),
+    *(make(axle) for make in (_roll_rate, _traction_slope, _pivot_height) for axle in AXLES),
 )
