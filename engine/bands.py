@@ -99,8 +99,9 @@ def bands(
         driven = [_vehicle_at(fit.free, vehicle, trial) for trial in trials]
         return _curves(driven, excitation.for_cars([vehicle]), model)
 
-    find = _linear if method == "linear" else _sampled
-    return find(fit.free, x, fit.errors, predicted, cars, seed)
+    if method == "linear":
+        return _linear(fit.free, x, fit.errors, predicted)
+    return _sampled(fit.free, x, fit.errors, predicted, cars, seed)
 
 
 def _linear(
@@ -108,8 +109,6 @@ def _linear(
     x: Array,
     errors: Uncertainty,
     predicted: Callable[[Sequence[Array]], _Curves],
-    cars: int,
-    seed: int,
 ) -> Bands:
     lower, upper = _bounds(free)
     ahead, behind = np.minimum(x + STEP, upper) - x, np.maximum(x - STEP, lower) - x
