@@ -21,6 +21,9 @@ from .vehicle import Brakes, Vehicle
 ASSUMED_FRONT_SHARE = 0.65
 """Of the braking force, where the vehicle has no brakes."""
 
+RIG_DURATION = 20.0
+"""Of a sweep on the rig, s: about that of a drive, so that neither gains by its length alone."""
+
 LIFTED = 0.005
 """Share of the time without tyre load that is worth a word."""
 
@@ -73,7 +76,12 @@ def catalogue() -> dict[str, Manoeuvre]:
             f"Constant 20 m/s, class {name.upper()}",
             road={"sections": [{"class": name.upper()}]},
         )
-    return found | {key: known[key] for key in _RIG}
+    for key in _RIG:
+        whole = known[key]
+        found[f"{key}-{RIG_DURATION:g}s"] = _varied(
+            whole, f"{whole.name}, in {RIG_DURATION:g} s", duration=RIG_DURATION
+        )
+    return found
 
 
 def _varied(

@@ -1,6 +1,6 @@
 """How often a fit's 95 % intervals hold the truth: the paper's campaign with noise on everything.
 
-    .venv/bin/python docs/studies/coverage.py [seeds]
+    .venv/bin/python docs/studies/interval_coverage.py [seeds]
 
 The reference car drives both manoeuvres of Table 2; each seed adds fresh noise, to what is compared
 (0.5 mm on z, 0.02 deg on pitch and roll) and to what drives the model (0.2 mm on the wheels, 0.05
