@@ -2,15 +2,15 @@
 
 What is known so far is the `Information` of the runs (none, for a car that is only known from a
 vehicle file). A candidate is driven by the car as it stands (`candidates`), recorded, and given to
-the rims mode as a run would be. What it would add are its Jacobian J at the current values, by
-differences of first order, which is good to a thousandth, and the scatter M of the residuals it
-would leave (`expected_noise`):
+the rims mode as a run would be (`new_run`). What it would add are its Jacobian J at the current
+values and the scatter M of the residuals it would leave (`expected_noise`):
 
     R^T R = sum J^T J,    M = sum M_run,    C = B M B,    B = (R^T R)^-1
 
 so that the errors afterwards are those of a fit to all runs, as far as the current values are near
-the true ones. Candidates are ranked by how many classes ("no", "weakly", "yes") the parameters
-rise together, then by the information gained,
+the true ones. What is found of the sensors counts as unknown throughout. Candidates are ranked by
+how many classes ("no", "weakly", "yes") the parameters rise together, then by the information
+gained,
 
     gain = 1/2 log2 (det(C_before + f^2) / det(C_after + f^2)) bits,
 
@@ -24,25 +24,22 @@ import math
 import time
 from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .candidates import Drive, braked, catalogue, drives
-from .channels import OUTPUT_CHANNELS
-from .condensed import triangle
+from .candidates import Drive, catalogue, drives
 from .errors import ProblemError
 from .expected_noise import INPUT_NOISE, ExpectedNoise, noise_of_runs, stated_noise
-from .filters import Band, in_band
 from .fit import determined
 from .identification import AT_BOUND
 from .integration import cores
 from .manoeuvre import Manoeuvre
+from .new_run import of_all_runs, said_by
 from .parameters import ALL_NAMES, PARAMETER_NAMES, default_bounds, parameter
 from .problem import FreeParameter, Problem
-from .residuals import DIFFERENCE, FAILED_TRIAL, Residuals
-from .rims import prepare
+from .residuals import FAILED_TRIAL, Residuals
 from .rims_settings import RimsSettings
 from .run_notes import DEFAULT_NOISE
 from .simulation import SAMPLE_STEP, rims_batch
@@ -153,9 +150,9 @@ def advise(
             "The car does not come through the runs at these values; fit it to the runs first."
         )
     runs = residuals.of_runs(r, residuals.jacobian(x))
-    known = sum(residuals.of_priors(), start=information(runs))
-    noise = noise_of_runs(problem, runs, known.root)
-    known = known.marginal(len(problem.free))
+    said = information(runs)
+    noise = noise_of_runs(problem, runs, said.root)
+    known = sum(residuals.of_priors(), start=said).marginal(of_all_runs(problem.variables))
     return _advised(problem, known, noise, candidates or catalogue(), planned, began)
 
 
@@ -200,7 +197,7 @@ class _State:
 
     @classmethod
     def of(cls, known: Information, free: Sequence[FreeParameter]) -> "_State":
-        errors = uncertainty(known)
+        errors = uncertainty(known.marginal(range(len(free))))
         return cls(known, _knowledge(free, errors), _bits(free, errors), _worst(errors))
 
 
@@ -247,36 +244,11 @@ def _added(
     problem: Problem, driven: Sequence[Drive], noise: ExpectedNoise
 ) -> tuple[dict[str, Information], dict[str, str]]:
     """What each candidate's run would add, and why some give none, by key."""
-    vehicle, x = braked(problem.vehicle), _variables(problem.free)
-    ahead = [x[k] + DIFFERENCE <= one.variable(one.upper) for k, one in enumerate(problem.free)]
-    steps = np.where(ahead, DIFFERENCE, -DIFFERENCE)
-    trials = list(x + np.vstack([np.zeros_like(x), np.diag(steps)]))
-    cars = replace(problem, vehicle=vehicle).cars_at(trials)
-
-    def add(one: Drive) -> Information | str:
-        if one.run is None:
-            return one.remark
-        inputs = prepare(one.run, vehicle, problem.settings)
-        moved = rims_batch(cars, inputs, problem.traction)
-        if not np.all(np.isfinite(moved)):
-            return "The car does not come through it on its recorded rims."
-        jacobian = _jacobian(moved, steps, inputs.time, noise, problem.settings.output_band)
-        return noise.information(triangle(jacobian.reshape(-1, len(x))), jacobian)
-
     with ThreadPoolExecutor(cores()) as pool:
-        found = dict(zip((one.key for one in driven), pool.map(add, driven), strict=True))
+        said = pool.map(lambda one: said_by(problem, one, noise), driven)
+        found = dict(zip((one.key for one in driven), said, strict=True))
     added = {key: one for key, one in found.items() if isinstance(one, Information)}
     return added, {key: one for key, one in found.items() if isinstance(one, str)}
-
-
-def _jacobian(moved: Array, steps: Array, time: Array, noise: ExpectedNoise, band: Band) -> Array:
-    """d(channel/noise)/dx, (channels, samples, n), from z, pitch and roll (1 + n, samples, 3)."""
-    slopes = (moved[1:] - moved[0]) / steps[:, np.newaxis, np.newaxis]
-    by_sample = in_band(time, slopes.transpose(1, 2, 0).reshape(len(time), -1), band)
-    by_channel = by_sample.reshape(len(time), 3, -1).transpose(1, 0, 2)
-    return np.stack(
-        [by_channel[OUTPUT_CHANNELS.index(name)] / noise.noise[name] for name in noise.channels]
-    )
 
 
 def _ranked(

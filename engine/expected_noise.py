@@ -8,7 +8,7 @@ as it is and once with white noise on the five inputs, both through the filters 
 the spectra are those of the difference, smoothed as residuals are. The car answers so little noise
 linearly, whatever else it does.
 
-Spectra are two-sided and by sample, in units of the channels' noise.
+Spectra are two-sided and by sample, in units of the channels' noise; runs are averaged in SI.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from .car_rows import car_row
 from .channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
+from .condensed import triangle
 from .filters import in_band
 from .problem import Problem
 from .rims import prepare
@@ -57,16 +58,18 @@ REFERENCE_SPEED = 15.0
 class ExpectedNoise:
     """Spectra of the residuals of a run that is not driven yet.
 
-    channels : compared, in order;  noise : their assumed standard deviations, SI
+    channels : compared, in order;  noise : their assumed standard deviations as read, SI
+    weights : mean weight of their samples in a robust loss
     step : time between samples, s
     width : lags, in samples, over which residuals are correlated
     frequency (f,) : Hz, from 0 to half the sampling rate
     density (channels, channels, f) : in units of the noise
-    worth : independent samples in one sample;  freedom : degrees of freedom of M in one sample
+    worth : independent samples of a channel;  freedom : degrees of freedom of M, both in one second
     """
 
     channels: tuple[str, ...]
     noise: Mapping[str, float]
+    weights: Mapping[str, float]
     step: float
     width: float
     frequency: Array
@@ -74,12 +77,14 @@ class ExpectedNoise:
     worth: float
     freedom: float
 
-    def information(self, root: Array, jacobian: Array) -> Information:
+    def information(self, jacobian: Array) -> Information:
         """What a run says by whose samples the model moves so.
 
-        root : (n, n) triangle of the Jacobian;  jacobian : (channels, samples, n)
+        jacobian : (channels, samples, n) of the channels in units of their noise
         """
-        channels, samples, _ = jacobian.shape
+        weights = np.array([self.weights[name] for name in self.channels])
+        weighted = np.sqrt(weights)[:, np.newaxis, np.newaxis] * jacobian
+        channels, samples, n = jacobian.shape
         length = transform_length(samples, self.width)
         frequency = _frequencies(length, self.step)
         density = np.array(
@@ -89,10 +94,10 @@ class ExpectedNoise:
             ]
         )
         return Information(
-            root,
-            scatter(jacobian, density, length),
-            self.worth * channels * samples,
-            self.freedom * samples,
+            triangle(weighted.reshape(-1, n)),
+            scatter(weighted, density, length),
+            self.worth * channels * samples * self.step,
+            self.freedom * samples * self.step,
         )
 
 
@@ -112,31 +117,49 @@ def noise_of_runs(problem: Problem, runs: Sequence[RunResiduals], root: Array) -
     frequency = _frequencies(max(run.residuals.shape[1] for run in runs), step)
     bread = bread_of(root)[0]
     total = np.zeros((len(channels), len(channels), len(frequency)), dtype=np.complex128)
-    samples = np.zeros((len(channels), len(channels), 1))
-    noise: dict[str, float] = {}
-    worth = freedom = 0.0
+    samples = np.zeros((len(channels), len(channels)))
+    squares, weights = np.zeros(len(channels)), np.zeros(len(channels))
+    worth = freedom = seconds = of_channels = 0.0
     for seen, run in zip(problem.runs, runs, strict=True):
         count, lags = run.residuals.shape[1], bandwidth(run.residuals, run.step)
         known = _frequencies(transform_length(count, lags), run.step)
         density = spectra(run, lags, bread)
         places = [channels.index(name) for name in seen.measured]
-        for a, row in zip(places, density, strict=True):
-            for b, of_pair in zip(places, row, strict=True):
-                total[a, b] += count * np.interp(frequency, known, of_pair)
+        noise = [seen.noise[name] for name in seen.measured]
+        for a, row, noise_a in zip(places, density, noise, strict=True):
+            for b, of_pair, noise_b in zip(places, row, noise, strict=True):
+                total[a, b] += count * noise_a * noise_b * np.interp(frequency, known, of_pair)
                 samples[a, b] += count
-        noise = {**seen.noise, **noise}
+        squares[places] += count * np.square(noise)
+        weights[places] += count * run.weights
         worth += sum(effective_samples(channel, lags) for channel in run.residuals)
         freedom += 3.0 * count / lags
+        seconds += count * run.step
+        of_channels += count * run.step * len(places)
+    counted = np.diag(samples)
+    typical = np.sqrt(squares / counted)
+    total /= np.maximum(samples, 1.0)[:, :, np.newaxis]
     return ExpectedNoise(
         channels,
-        noise,
+        dict(zip(channels, typical.tolist(), strict=True)),
+        dict(zip(channels, (weights / counted).tolist(), strict=True)),
         step,
         width,
         frequency,
-        total / np.maximum(samples, 1.0),
-        worth / sum(run.residuals.size for run in runs),
-        freedom / sum(run.residuals.shape[1] for run in runs),
+        _possible(total / np.outer(typical, typical)[:, :, np.newaxis]),
+        worth / of_channels,
+        freedom / seconds,
     )
+
+
+def _possible(density: Complex) -> Complex:
+    """Spectra that noise can have: positive semidefinite at every frequency.
+
+    Averages are, but for channels of which each pair is in runs of its own.
+    """
+    powers, axes = np.linalg.eigh(density.transpose(2, 0, 1))
+    kept = axes * np.maximum(powers, 0.0)[:, np.newaxis, :]
+    return (kept @ axes.conj().transpose(0, 2, 1)).transpose(1, 2, 0)
 
 
 def stated_noise(
@@ -164,12 +187,13 @@ def stated_noise(
     return ExpectedNoise(
         channels,
         {name: float(noise[name]) for name in channels},
+        dict.fromkeys(channels, 1.0),
         step,
         width,
         frequency,
         density,
-        1.0,
-        3.0 / width,
+        1.0 / step,
+        3.0 / (width * step),
     )
 
 

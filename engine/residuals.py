@@ -166,6 +166,7 @@ class Residuals:
                     psi[place].reshape(channels, samples) / root,
                     slopes[place].reshape(channels, samples, -1) * root[:, :, np.newaxis],
                     float(time[-1] - time[0]) / (samples - 1),
+                    root[:, 0] ** 2,
                 )
             )
             begin = place.stop

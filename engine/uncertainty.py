@@ -39,8 +39,8 @@ s_i <= DIRECTION_TOLERANCE s_max, or s_i <= LEAST_EFFECT. A parameter with a par
 direction has an infinite standard error.
 """
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,11 +78,13 @@ class RunResiduals:
 
     residuals : (channels, samples);  jacobian : (channels, samples, n)
     step : mean time between samples, s
+    weights : (channels,) mean weight of a sample in a robust loss, whose root both hold
     """
 
     residuals: Array
     jacobian: Array
     step: float
+    weights: Array = field(default_factory=lambda: np.ones(1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,17 +111,29 @@ class Information:
             self.freedom + other.freedom,
         )
 
-    def marginal(self, first: int) -> "Information":
-        """What they say of the first variables, whatever the others are: J^T J becomes its Schur
-        complement S, and M what gives the same covariance, S C S.
+    def marginal(self, kept: Sequence[int]) -> "Information":
+        """What they say of some of the variables, whatever the others are.
+
+        The others take the part out of J that they could explain: with N their columns and A the
+        kept ones, J^T J becomes the Schur complement A^T (1 - N N^+) A, and M that of the scores
+        (A - N N^+ A)^T r, so that covariances stay as they are.
         """
-        count = len(self.root)
-        others_first = [*range(first, count), *range(first)]
-        root = triangle(self.root[:, others_first])[count - first :, count - first :]
-        bread = bread_of(self.root)[0]
-        covariance = (bread @ self.scatter @ bread)[:first, :first]
-        schur = root.T @ root
-        return Information(root, schur @ covariance @ schur, self.samples, self.freedom)
+        others = [k for k in range(len(self.root)) if k not in kept]
+        if not others:
+            return self
+        kept = list(kept)
+        left, singular, right = np.linalg.svd(self.root[:, others], full_matrices=False)
+        held = singular > _least_effect(self.root)
+        left, right = left[:, held], right[held]
+        beside = self.root[:, kept] - left @ (left.T @ self.root[:, kept])
+        # Scores of the kept variables less what the others explain of them.
+        taken = (left.T @ self.root[:, kept]).T @ (right / singular[held, np.newaxis])
+        score = np.zeros((len(kept), len(self.root)))
+        score[range(len(kept)), kept] = 1.0
+        score[:, others] = -taken
+        return Information(
+            triangle(beside), score @ self.scatter @ score.T, self.samples, self.freedom
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,10 +227,15 @@ def uncertainty(known: Information) -> Uncertainty:
 def bread_of(root: Array) -> tuple[Array, Array, float]:
     """B over the directions which the runs move, the others (k, n), and their largest effect."""
     _, singular, directions = np.linalg.svd(root)
-    least = max(DIRECTION_TOLERANCE * singular[0], LEAST_EFFECT)
+    least = _least_effect(root)
     held = singular > least
     inverse_root = directions[held].T / singular[held]
     return inverse_root @ inverse_root.T, directions[~held], least
+
+
+def _least_effect(root: Array) -> float:
+    """Effect, |R v| of a unit direction v, from which on one is known."""
+    return max(DIRECTION_TOLERANCE * float(np.linalg.norm(root, 2)), LEAST_EFFECT)
 
 
 def smoothed_covariance(one: Array, other: Array, bandwidth: float) -> Array:

@@ -266,10 +266,23 @@ def test_marginal_information_gives_the_marginal_errors():
     rng = np.random.default_rng(0)
     slopes, scores = rng.normal(size=(40, 5)), rng.normal(size=(40, 5))
     whole = Information(triangle(slopes), scores.T @ scores, 40.0, 30.0)
-    part, errors = uncertainty(whole.marginal(2)), uncertainty(whole).marginal(2)
+    of_two = whole.marginal([0, 1])
+    part, errors = uncertainty(of_two), uncertainty(whole).marginal(2)
     assert_allclose(part.covariance, errors.covariance, rtol=1e-10)
     schur = np.linalg.inv(np.linalg.inv(slopes.T @ slopes)[:2, :2])
-    assert_allclose(whole.marginal(2).root.T @ whole.marginal(2).root, schur, rtol=1e-10)
+    assert_allclose(of_two.root.T @ of_two.root, schur, rtol=1e-10)
+
+
+def test_a_variable_without_effect_takes_nothing_from_the_others():
+    """As the gain of an a_x that is zero throughout. Oracle: the information without it."""
+    rng = np.random.default_rng(0)
+    slopes, scores = rng.normal(size=(40, 3)), rng.normal(size=(40, 3))
+    slopes[:, 2] = scores[:, 2] = 0.0
+    whole = Information(triangle(slopes), scores.T @ scores, 40.0, 30.0)
+    known = Information(triangle(slopes[:, :2]), scores[:, :2].T @ scores[:, :2], 40.0, 30.0)
+    found = uncertainty(whole.marginal([0, 1]))
+    assert_allclose(found.covariance, uncertainty(known).covariance, rtol=1e-10)
+    assert len(found.unknown) == 0
 
 
 def test_a_turned_channel_is_offered_its_sign_and_then_fits_as_if_it_were_not(true):
