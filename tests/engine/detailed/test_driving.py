@@ -195,10 +195,13 @@ def test_what_it_cannot_do_is_said_before_anything_is_solved(manoeuvre, options,
 
 
 def test_manoeuvre_2_lies_in_the_ranges_of_the_paper():
-    """Oracle: Table 2 and Figs. 9 and 12; the first 11 s, on the smooth end of the classes."""
+    """Oracle: Table 2 and Figs. 9 and 12; the first 11 s, on the smooth end of the classes.
+
+    The longest step, with which a_x is off by 4 %, is enough for speeds and a mean pitch.
+    """
     two = reference_manoeuvres()["2"]
     road = replace(two.road, class_factor=0.5, band=(0.03, 2.83))
-    run = drive(CAR, replace(two.lasting(12.0), road=road))
+    run = drive(CAR, replace(two.lasting(12.0), road=road), step=LONGEST_STEP, sample_step=0.01)
     assert run["drive.rl.torque"].max() == pytest.approx(600.0, rel=0.05)
     assert run["chassis.v_x"].max() == pytest.approx(15.0, rel=0.01)
     pulling = (run.time > 6.5) & (run.time < 9.8)
