@@ -2,13 +2,17 @@
 
 import csv
 import io
+import logging
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import pytest
+from dask import config
+from distributed import LocalCluster
 from fastapi.testclient import TestClient
+from ridetune.app.cluster import CONFIGURATION
 from ridetune.app.main import create_app
 from ridetune.app.settings import Limits, Settings
 
@@ -70,6 +74,20 @@ class Visitor:
                 return kept
             assert time.monotonic() < deadline, kept
             time.sleep(0.05)
+
+
+@pytest.fixture(scope="session")
+def workers() -> Iterator[str]:
+    """Address of the job workers that many services share: to start some takes ten seconds."""
+    config.set(CONFIGURATION)
+    with LocalCluster(
+        n_workers=1,
+        threads_per_worker=1,
+        dashboard_address=None,
+        scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
+        silence_logs=logging.ERROR,
+    ) as cluster:
+        yield cluster.scheduler_address
 
 
 @pytest.fixture

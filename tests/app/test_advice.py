@@ -10,9 +10,11 @@ PAPER = vehicle_to_json(reference_vehicles()["paper"])
 
 
 @pytest.fixture(scope="module")
-def engineer(tmp_path_factory):
-    """A session on a service with workers of its own."""
-    settings = Settings(data=tmp_path_factory.mktemp("advice"), limits=Limits(advised_seconds=100))
+def engineer(tmp_path_factory, workers):
+    """A session on a service with workers."""
+    settings = Settings(
+        data=tmp_path_factory.mktemp("advice"), cluster=workers, limits=Limits(advised_seconds=100)
+    )
     with open_client(settings) as client:
         yield Visitor(client)
 

@@ -48,9 +48,11 @@ def test_a_fits_file_gives_bands_beside_the_run(folder, capsys):
 
 
 @pytest.fixture(scope="module")
-def engineer(tmp_path_factory):
-    """A session on a service with workers of its own."""
-    settings = Settings(data=tmp_path_factory.mktemp("bands"), limits=Limits(banded_steps=100_000))
+def engineer(tmp_path_factory, workers):
+    """A session on a service with workers."""
+    settings = Settings(
+        data=tmp_path_factory.mktemp("bands"), cluster=workers, limits=Limits(banded_steps=100_000)
+    )
     with open_client(settings) as client:
         yield Visitor(client)
 

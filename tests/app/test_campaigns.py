@@ -30,9 +30,11 @@ BUMP = manoeuvre_to_json(reference_manoeuvres()["bump"])
 
 
 @pytest.fixture(scope="module")
-def engineer(tmp_path_factory):
-    """A session on a service with workers of its own."""
-    with open_client(Settings(data=tmp_path_factory.mktemp("campaigns"))) as client:
+def engineer(tmp_path_factory, workers):
+    """A session on a service with workers."""
+    with open_client(
+        Settings(data=tmp_path_factory.mktemp("campaigns"), cluster=workers)
+    ) as client:
         yield Visitor(client)
 
 
@@ -90,8 +92,9 @@ def test_what_a_campaign_shows_repeats_it(engineer, done):
     assert again["result"]["recordings"] == done["result"]["recordings"]
 
 
-def test_untold_the_session_s_car_drives_the_usual_manoeuvres_on_ideal_sensors(visitor):
+def test_untold_the_session_s_car_drives_the_usual_manoeuvres_on_ideal_sensors(engineer):
     """The request is not driven here; what it stands for is shown at once."""
+    visitor = Visitor(engineer.client)
     job = visitor.post("/campaigns", json={}).json()
     assert list(job["manoeuvres"]) == list(CAMPAIGN)
     assert (job["plant"], job["noise"], job["sensors"], job["format"]) == (
@@ -146,9 +149,9 @@ def test_recordings_become_measurements_once(engineer, done):
     assert len(engineer.get("/measurements").json()) == len(before) + 2
 
 
-def test_recordings_that_do_not_all_fit_are_not_taken_over(tmp_path):
+def test_recordings_that_do_not_all_fit_are_not_taken_over(tmp_path, workers):
     limits = Limits(session_measurements=3)
-    with open_client(Settings(data=tmp_path, limits=limits)) as client:
+    with open_client(Settings(data=tmp_path, cluster=workers, limits=limits)) as client:
         visitor = Visitor(client)
         job = visitor.wait_for("campaigns", submit(visitor)["id"])
         refused = visitor.post(f"/campaigns/{job['id']}/measurements")
@@ -354,6 +357,7 @@ def test_the_detailed_car_tells_how_far_it_is_and_stops_in_the_midst_of_a_drive(
     told, deadline = set(), time.monotonic() + PATIENCE
     while len([seconds for seconds in told if seconds > 0.4]) < 3:
         assert time.monotonic() < deadline, told
+        time.sleep(0.02)
         told.add(engineer.get(f"/campaigns/{job['id']}").json()["progress"].get("driven", 0.0))
     engineer.post(f"/campaigns/{job['id']}/cancel")
     ended = engineer.wait_for("campaigns", job["id"])

@@ -690,7 +690,7 @@ def test_a_stopped_campaign_says_what_is_written_and_leaves_no_process(folder, s
             running.stdout.readline()
         children = Path(f"/proc/{running.pid}/task/{running.pid}/children")
         while len(children.read_text().split()) < 3:  # the drives' and the resource tracker
-            pass
+            time.sleep(0.01)
         stop(running.pid)
         assert running.wait(timeout=60) == status
         told = "Interrupted: nothing written whole, manoeuvre_1, manoeuvre_bump not.\n"

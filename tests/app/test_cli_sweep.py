@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -164,7 +165,7 @@ def test_an_interrupted_sweep_leaves_no_file(folder, number, status):
     asked = f"{SHORT} {BOX} --cars 100000 -o cars.parquet".split()
     with subprocess.Popen([*program, *asked], stderr=subprocess.PIPE, text=True) as running:
         while running.poll() is None and not os.listdir():
-            pass
+            time.sleep(0.01)
         running.send_signal(number)
         assert running.wait(timeout=60) == status
         assert running.stderr.read() == ""

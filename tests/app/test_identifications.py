@@ -26,9 +26,9 @@ REAR = "rear.suspension.stiffness"
 
 
 @pytest.fixture(scope="module")
-def engineer(tmp_path_factory):
-    """A session on a service with workers of its own."""
-    with open_client(Settings(data=tmp_path_factory.mktemp("fits"))) as client:
+def engineer(tmp_path_factory, workers):
+    """A session on a service with workers."""
+    with open_client(Settings(data=tmp_path_factory.mktemp("fits"), cluster=workers)) as client:
         yield Visitor(client)
 
 
@@ -220,7 +220,7 @@ def test_a_running_identification_is_cancelled(engineer):
     assert (ended["state"], ended["error"], ended["result"]) == ("cancelled", None, None)
 
 
-def test_after_a_kill_nothing_is_left_behind_and_nothing_is_lost(tmp_path):
+def test_after_a_kill_nothing_is_left_behind_and_nothing_is_lost(tmp_path, workers):
     """Workers go with the service; uploads are byte-exact; acknowledged jobs run after all."""
     recording = (SAMPLES / "twin/manoeuvre_1.csv").read_bytes()
     with LiveService(tmp_path) as service:
@@ -234,8 +234,7 @@ def test_after_a_kill_nothing_is_left_behind_and_nothing_is_lost(tmp_path):
         service.kill()
         _, alive = psutil.wait_procs(family, timeout=10)
         assert alive == []
-    with LiveService(tmp_path) as service:
-        visitor.client = service.client
+    with open_client(Settings(data=tmp_path, cluster=workers)) as visitor.client:
         assert visitor.get(f"/measurements/{run}/original").content == recording
         ended = visitor.wait_for("identifications", job)
         assert ended["state"] == "done", ended["error"]

@@ -13,9 +13,11 @@ PAPER = vehicle_to_json(reference_vehicles()["paper"])
 
 
 @pytest.fixture(scope="module")
-def engineer(tmp_path_factory):
-    """A session on a service with workers of its own."""
-    with open_client(Settings(data=tmp_path_factory.mktemp("validations"))) as client:
+def engineer(tmp_path_factory, workers):
+    """A session on a service with workers."""
+    with open_client(
+        Settings(data=tmp_path_factory.mktemp("validations"), cluster=workers)
+    ) as client:
         yield Visitor(client)
 
 
