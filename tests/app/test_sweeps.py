@@ -31,9 +31,9 @@ BUMP = {"manoeuvre": "bump", "duration": 1.5, "vehicle": PAPER}
 
 
 @pytest.fixture(scope="module")
-def engineer(tmp_path_factory):
-    """A session on a service with workers of its own."""
-    with open_client(Settings(data=tmp_path_factory.mktemp("sweeps"))) as client:
+def engineer(tmp_path_factory, workers):
+    """A session on a service with workers."""
+    with open_client(Settings(data=tmp_path_factory.mktemp("sweeps"), cluster=workers)) as client:
         yield Visitor(client)
 
 
@@ -282,20 +282,17 @@ def test_what_goes_to_the_worker_is_everything_it_needs(tmp_path, monkeypatch):
         }
 
 
-def test_a_sweep_outlives_a_kill_of_the_service_and_so_do_its_rows(tmp_path):
+def test_a_sweep_outlives_a_kill_of_the_service_and_so_do_the_rows_of_another(tmp_path, workers):
     with LiveService(tmp_path) as service:
         visitor = Visitor(service.client)
         until(lambda: service.client.get("/readyz").status_code == 200, patience=COMPILING)
-        job = submit(visitor, design={**BOX, "cars": 60})["id"]
-        visitor.wait_for("sweeps", job, "running")
+        done = visitor.wait_for("sweeps", submit(visitor)["id"])
+        before = rows(visitor, done)
+        job = submit(visitor, design={**BOX, "cars": 100})["id"]
+        assert visitor.wait_for("sweeps", job, "running")["state"] == "running"
         service.kill()
-    with LiveService(tmp_path) as service:
-        visitor.client = service.client
+    with open_client(Settings(data=tmp_path, cluster=workers)) as visitor.client:
+        assert_same(rows(visitor, done), before)
         ended = visitor.wait_for("sweeps", job)
         assert ended["state"] == "done", ended["error"]
-        first = rows(visitor, ended)
-        service.kill()
-    with LiveService(tmp_path) as service:
-        visitor.client = service.client
-        assert_same(rows(visitor, ended), first)
-        assert first.num_rows == 60
+        assert rows(visitor, ended).num_rows == 100
