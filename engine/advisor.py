@@ -44,6 +44,7 @@ from .rims_settings import RimsSettings
 from .run_notes import DEFAULT_NOISE
 from .simulation import SAMPLE_STEP, rims_batch
 from .uncertainty import Information, Uncertainty, information, uncertainty
+from .units import in_percent
 from .variables import Variable
 from .vehicle import Vehicle
 
@@ -351,4 +352,4 @@ def _ratio(before: Knowledge, after: Knowledge) -> float:
 
 def _percent(one: Knowledge) -> str:
     """Standard error over value."""
-    return f"{100.0 * one.relative:.2g} %" if one.relative < UNKNOWN else "unknown"
+    return in_percent(one.relative) if one.relative < UNKNOWN else "unknown"

@@ -16,6 +16,7 @@ from .excitation import FreeExcitation
 from .integration import cores
 from .manoeuvre import Manoeuvre, manoeuvre_from_json, manoeuvre_to_json, reference_manoeuvres
 from .simulation import SAMPLE_STEP
+from .units import in_percent
 from .vehicle import Brakes, Vehicle
 
 ASSUMED_FRONT_SHARE = 0.65
@@ -130,7 +131,7 @@ def _drive(vehicle: Vehicle, key: str, manoeuvre: Manoeuvre, *, sample_step: flo
     lifted = max(found.negative_load_share.values())
     if lifted > LIFTED:
         remarks.append(
-            f"A tyre would carry nothing for {100.0 * lifted:.0f} % of the time, where the model "
+            f"A tyre would carry nothing for {in_percent(lifted)} of the time, where the model "
             "pulls on the road."
         )
     names = (*INPUT_CHANNELS, *OUTPUT_CHANNELS, "chassis.v_x")

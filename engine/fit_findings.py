@@ -18,7 +18,7 @@ from .problem import Problem
 from .simulation import fit_percent
 from .spikes import despiked
 from .uncertainty import Uncertainty
-from .units import after_number
+from .units import after_number, in_percent
 
 Array = NDArray[np.float64]
 Histories = Mapping[str, Mapping[str, Array]]
@@ -219,7 +219,7 @@ def outlier_findings(problem: Problem, runs: Sequence[FittedRun]) -> list[str]:
             share = count / run.samples
             if share > MANY_OUTLIERS:
                 found.append(
-                    f"{100.0 * share:.0f} % of {channel} of run {run.name} lie beyond "
+                    f"{in_percent(share)} of {channel} of run {run.name} lie beyond "
                     f"{loss.scale:g} noises of the model, too many for outliers: the {loss.name} "
                     "loss mends no misfit, so check the noise and the car's known data."
                 )

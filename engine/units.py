@@ -10,6 +10,7 @@ whatever arithmetic a file's header holds, and a table of words that mean someth
 `/` divides by the next factor only: N/m/s is N/(m s).
 """
 
+import math
 import re
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 LONGEST_TEXT = 40
 """Longest unit text that is looked at, characters."""
 
+LEAST_PERCENT = 0.01
+"""Below it a share in per cent is only said to be less."""
+
 
 class UnitError(RideError):
     """A unit text is unknown or measures something else; the caller adds file and column."""
@@ -32,6 +36,16 @@ class UnitError(RideError):
 def after_number(unit: str) -> str:
     """A unit as it stands behind a number in a sentence; nothing for that of a plain number."""
     return "" if unit == "1" else f" {unit}"
+
+
+def in_percent(share: float) -> str:
+    """A share as it stands in a sentence: in per cent, two digits, never with an exponent."""
+    value = 100.0 * share
+    if value == 0.0:
+        return "0 %"
+    if abs(value) < LEAST_PERCENT:
+        return f"<{LEAST_PERCENT:g} %"
+    return f"{round(value, 1 - math.floor(math.log10(abs(value)))):.15g} %"
 
 
 _PLAIN_NUMBER = {"", "-", "1"}

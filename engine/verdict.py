@@ -21,7 +21,7 @@ from .combinations import COMBINATIONS, Combination
 from .fit import CombinationEstimate, Direction, ParameterEstimate, Verdict, determined
 from .parameters import parameter
 from .uncertainty import Uncertainty
-from .units import after_number
+from .units import after_number, in_percent
 from .variables import FARTHEST
 from .vehicle import Vehicle
 
@@ -194,10 +194,10 @@ def _of_parameters(classes: Mapping[str, Sequence[str]]) -> list[str]:
 def _of_combination(one: CombinationEstimate, known: Sequence[str]) -> str:
     apart = [parameter(name).symbol for name in one.of if name not in known]
     low, high = one.confidence_interval
-    percent = 50.0 * (high - low) / abs(one.value)
+    half_width = 0.5 * (high - low) / abs(one.value)
     are = "are determined only together" if len(apart) > 1 else "is determined better"
     return (
         f"{', '.join(apart[:-1])}{' and ' if apart[1:] else ''}{apart[-1]} {are}, as {one.symbol},"
         f" the {one.label[0].lower()}{one.label[1:]}: {one.value:.4g}{after_number(one.unit)}"
-        f" to {percent:.2g} %."
+        f" to {in_percent(half_width)}."
     )

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from ridetune.engine.units import UnitError, to_si
+from ridetune.engine.units import UnitError, in_percent, to_si
 
 
 @pytest.mark.parametrize(
@@ -90,3 +90,20 @@ def test_an_unknown_unit_is_refused(text):
 def test_arithmetic_in_a_unit_is_never_evaluated(text):
     with pytest.raises(UnitError):
         to_si(text, "m")
+
+
+@pytest.mark.parametrize(
+    ("share", "said"),
+    [
+        (1.1, "110 %"),
+        (12.34, "1200 %"),
+        (0.0996, "10 %"),
+        (0.052, "5.2 %"),
+        (0.005, "0.5 %"),
+        (5e-5, "<0.01 %"),
+        (-0.25, "-25 %"),
+        (0.0, "0 %"),
+    ],
+)
+def test_a_percentage_has_two_digits_and_no_exponent(share, said):
+    assert in_percent(share) == said
