@@ -101,13 +101,11 @@ def print_fit(fit: Fit) -> None:
     """Print parameters, fit percents, outcome and warnings."""
     rows = [("parameter", "value", "± (95 %)", "unit", "determined")]
     for estimate in (*fit.parameters, *fit.sensors):
-        lower, upper = estimate.confidence_interval
-        half = (upper - lower) / 2.0
         rows.append(
             (
                 estimate.title,
                 significant(estimate.value, 5),
-                significant(half, 2) if math.isfinite(half) else "unknown",
+                _error(*estimate.confidence_interval),
                 estimate.unit,
                 estimate.determined,
             )
@@ -125,6 +123,15 @@ def print_fit(fit: Fit) -> None:
     for offer in fit.offers:
         for quantity, value in offer.sensor.items():
             print(f"{offer.sentence} Add --sensor {offer.channel}.{quantity}={value:.9g}.")
+
+
+def _error(lower: float, upper: float) -> str:
+    """Half of an interval, or the end that is known of one that lies open."""
+    if math.isfinite(lower) and math.isfinite(upper):
+        return significant((upper - lower) / 2.0, 2)
+    if math.isfinite(lower):
+        return f"from {significant(lower, 3)}"
+    return f"up to {significant(upper, 3)}" if math.isfinite(upper) else "unbounded"
 
 
 def _print_profiles(profiles: Sequence[Profile]) -> None:
