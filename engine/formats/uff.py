@@ -5,6 +5,8 @@ unit that of the ordinate's axis. Spectra and complex functions are left out, by
 """
 
 import math
+import mmap
+import re
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,9 @@ LARGEST = 400_000_000
 _TIME, _FREQUENCY = 17, 18
 _SPECTRA = frozenset((2, 3, 4, 6, 9, 10, 12, 13))
 """Cross, auto and power spectra, frequency responses, coherences, transfer functions, ..."""
+
+_ENDS = re.compile(rb"    -1(?=[\r\n]|$| {74})")
+"""Both ends of a data set, as pyuff looks for them."""
 
 _DIRECTIONS = {1: "+X", -1: "-X", 2: "+Y", -2: "-Y", 3: "+Z", -3: "-Z", 0: ""}
 _SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
@@ -41,6 +46,8 @@ class UffFile(Table):
         sets = [k for k, form in enumerate(self._file.get_set_types()) if form == 58]
         for k in sets:
             self._list(listing, k, self._file.read_sets(k, header_only=True))
+        if _is_cut(path):
+            listing.leave_out("the last data set", "is cut short")
         if not sets:
             listing.leave_out("the file", "holds no data set 58")
         self.columns, self.warnings = listing.columns(), listing.warnings()
@@ -89,6 +96,12 @@ class UffFile(Table):
                 f" declares {declared}; it is cut short, so export it again."
             )
         return values[:declared]
+
+
+def _is_cut(path: Path) -> bool:
+    """Whether a data set begins that does not end, which pyuff passes over."""
+    with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        return sum(1 for _ in _ENDS.finditer(data)) % 2 == 1
 
 
 def _label(text: Any) -> str:

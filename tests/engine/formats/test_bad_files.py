@@ -263,6 +263,17 @@ def test_a_spectrum_is_named(tmp_path):
     assert "chassis.z, chassis.a_x is a spectrum, not a time history" in said
 
 
+@pytest.mark.parametrize("binary", [False, True])
+def test_a_uff_file_that_ends_within_a_data_set_says_so(tmp_path, binary):
+    """All but the last of its bytes: the first data set is whole, the second has no end."""
+    files.uff(tmp_path / "r.uff", binary=binary)
+    data = (tmp_path / "r.uff").read_bytes().rstrip()
+    path = held(tmp_path, "r.uff", data[:-2])
+    with opened(path, "r.uff") as table:
+        assert [column.name for column in table.columns] == ["chassis.z"]
+        assert any("the last data set is cut short" in said for said in table.warnings)
+
+
 def slow(monkeypatch, code):
     """A reader that does something else, under the name of TDMS."""
     monkeypatch.setattr("ridetune.engine.formats.child.COMMAND", code)
