@@ -15,6 +15,9 @@ from .names import Reading
 STRANGE_WORD, MOST_STRANGE = 0.95, 4
 """What each unknown word leaves of a fit, and how many count."""
 
+BARE_AXIS = 0.7
+"""What a name leaves of a fit that says an axis, x, y or z, and nothing else."""
+
 Fits = Mapping[str, float]
 
 _CORNER_OF: Mapping[tuple[str, str], Corner] = {
@@ -110,6 +113,8 @@ def fits(reading: Reading, measured: str) -> Iterator[tuple[str, float]]:
     """
     quantity = reading.said.get("quantity", "") or measured
     kept = STRANGE_WORD ** min(reading.strange, MOST_STRANGE)
+    if reading.said.keys() == {"axis"} and reading.said["axis"] in "xyz":
+        kept *= BARE_AXIS
     for pattern in PATTERNS:
         fit = kept * pattern.quantity.get(quantity, 0.0)
         fit *= pattern.axis.get(reading.said.get("axis", ""), 0.0)

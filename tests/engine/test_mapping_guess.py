@@ -410,6 +410,15 @@ def test_stand_ins_gaps_and_constant_columns_are_named():
     assert by_channel["chassis.z"].reason == "name and unit"
 
 
+def test_a_bare_axis_is_a_guess_to_confirm():
+    """The page marks what is less sure than 0.7; a name of car or quantity is enough not to be."""
+    time = np.arange(0.0, 5.0, 0.01)
+    for title, sure in (("x", False), ("a_x", True), ("vehicle x", True)):
+        [one] = guessed(held({title: ("m/s^2", np.sin(time))})).chosen.values()
+        assert one.channel == "chassis.a_x"
+        assert (one.confidence >= 0.7) is sure
+
+
 def test_of_a_file_too_large_only_what_may_be_a_channel_is_read(monkeypatch):
     time = np.arange(0.0, 5.0, 0.01)
     table = held({"Time": ("s", time), "oil": ("bar", time), "heave": ("mm", np.sin(time))})
