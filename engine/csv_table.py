@@ -276,6 +276,12 @@ class CsvTable:
         cells, width = line.split(self._delimiter), len(self.header)
         if len(cells) > width and not any(cell.strip() for cell in cells[width:]):
             return
+        if not any(map(is_number, cells)):  # prose, not a row that lacks a cell
+            raise self._refuse(
+                " holds no number; give the columns' names on one line and below it nothing but"
+                " rows of numbers",
+                number,
+            )
         hint = ""
         if self._delimiter == "," and len(cells) > width:
             hint = " (with decimal commas, separate the columns by semicolons)"

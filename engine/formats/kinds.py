@@ -88,7 +88,9 @@ def _recognized(head: bytes, source: str) -> str:
             source, 'is no MAT file of version 5 or 7.3; save it in MATLAB with the option "-v7"'
         )
     if head.startswith(b"$") and (b"$CT" in head or b"$ROAD_CRG" in head):
-        raise _refused(source, "is an OpenCRG road, not a recording; give it where a road is asked")
+        raise _refused(
+            source, "is an OpenCRG road, not a recording; drive on it with ridetune simulate --road"
+        )
     if suffix == ".info" or (b"File.At.1.Name" in head and _ERG_INFO.match(head)):
         raise _refused(
             source,

@@ -41,17 +41,25 @@ class Survey:
 
 
 def survey(table: Table) -> Survey:
-    """What is in a table."""
+    """What is in a table; text in which no column holds numbers is refused."""
     columns = table.columns
     clocks = {one.clock for one in columns if one.clock is not None}
     wanted = range(len(columns))
     if sum(one.samples for one in columns) > MOST_SURVEYED:
         wanted = sorted({*named_like_channels(columns), *clocks})
-    known, warnings = {}, list(table.warnings)
+    known: dict[int, Statistics] = {}
+    bad: list[str] = []
     for index in wanted:
         try:
             known[index] = statistics(table.values(index))
         except MeasurementError as error:
-            warnings.append(str(error).removeprefix(f"{table.source}: "))
+            bad.append(str(error).removeprefix(f"{table.source}: "))
+    if len(wanted) == len(columns) and all(one.samples == one.missing for one in known.values()):
+        why = f" ({bad[0].rstrip('.').split('; ')[0]})" if bad else ""
+        raise MeasurementError(
+            f"{table.source}: no table of numbers was found{why}; export the recording with the"
+            " columns' names on one line and a row of numbers a sample."
+        )
     found = guess(columns, known, clocks_told=table.kind != CSV)
-    return Survey(table.source, table.kind, columns, known, found, (*warnings, *found.warnings))
+    warnings = (*table.warnings, *bad, *found.warnings)
+    return Survey(table.source, table.kind, columns, known, found, warnings)

@@ -3,8 +3,11 @@
 import hashlib
 import json
 
+import h5py
+import numpy as np
 import pytest
 from ridetune.engine.manoeuvre import manoeuvre_to_json, reference_manoeuvres
+from scipy.io import savemat
 
 from .. import files_of_kinds
 from .conftest import SAMPLES, Visitor, open_client, short_recording
@@ -178,6 +181,7 @@ BAD_FILES = {
     "a gap": (short_recording().replace(b"\n0.50,", b"\n0.50,,,,,,,\n0.505,"), "line 52"),
     "an array": (b"\x93NUMPY\x01\x00" + bytes(100), "is a NumPy array"),
     "packed": (b"\x1f\x8b\x08" + bytes(100), "is packed with gzip; unpack it"),
+    "prose": (b"hello\nworld", "no table of numbers was found (line 2, column hello: 'world' is"),
     "half a TDMS file": (b"TDSm" + bytes(24), "cannot be read as TDMS"),
     "not a number": (short_recording().replace(b"\n0.50,", b"\n0.50,nan,"), "line 52"),
     "overflow": (short_recording().replace(b"\n0.50,", b"\n1e999,"), "line 52"),
@@ -196,6 +200,53 @@ def test_a_bad_file_is_refused_with_a_sentence_and_nothing_is_kept(visitor, sett
     assert said in reply.json()["detail"]
     assert len(visitor.get("/measurements").json()) == before
     assert {path.name for path in (settings.data / "originals").glob("*/*")} == files
+
+
+def cut(path):
+    """The first half of what is written there."""
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) // 2])
+
+
+def cut_mdf(path):
+    files_of_kinds.mdf(path)
+    cut(path)
+
+
+def cut_hdf5(path):
+    files_of_kinds.hdf5(path)
+    cut(path)
+
+
+def linked(path):
+    with h5py.File(path, "w") as file:
+        file["chassis.z"] = h5py.ExternalLink("/etc/passwd", "/x")
+
+
+def cells(path):
+    savemat(path, {"chassis.z": np.array([1, "a"], dtype=object)})
+
+
+DAMAGED = {
+    "half.mf4": (cut_mdf, "damaged"),
+    "half.h5": (cut_hdf5, "damaged"),
+    "link.h5": (linked, "chassis.z is a link, which is not followed"),
+    "cells.mat": (cells, "chassis.z is a cell array"),
+    "picture.mat": (lambda path: path.write_bytes(b"\x89PNG\r\n" + bytes(600)), "is a picture"),
+    "text.tdms": (lambda path: path.write_bytes(b"hello\nworld"), "no table of numbers"),
+    "empty.parquet": (lambda path: path.write_bytes(b""), "the file is empty"),
+}
+
+
+def test_what_is_damaged_is_refused_and_the_service_goes_on(visitor, tmp_path):
+    """Oracle: what was done to the file; the next one is taken. All kinds: test_bad_files.py."""
+    for name, (write, said) in DAMAGED.items():
+        write(tmp_path / name)
+        reply = visitor.upload((tmp_path / name).read_bytes(), name)
+        assert (reply.status_code, reply.json()["code"]) == (422, "measurement"), name
+        assert reply.json()["detail"].startswith(f"{name}: ")
+        assert said in reply.json()["detail"]
+    assert visitor.upload(short_recording()).status_code == 201
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])

@@ -141,6 +141,7 @@ def test_a_bad_cell_after_many_lines_is_named_by_its_line():
         ("sep=;\n", "run.csv: the file is blank"),
         ("time,a\n", "run.csv: no samples stand below the header"),
         ("time,a\n\n,\n", "run.csv: no samples stand below the header"),
+        ("Dear all,\nplease find, as agreed, the data\n", "run.csv: line 2 holds no number; give"),
         ("time,a\n1,2\n3\n", "run.csv: line 3 holds 1 cells where the header names 2 columns"),
         ("time,a\n1,2\n3,4,5\n", "run.csv: line 3 holds 3 cells where the header names 2"),
         ("t,a\n0,5,1,5\n", "with decimal commas, separate the columns by semicolons"),
