@@ -214,19 +214,21 @@ def with_braking(run: Run, intervals: Iterable[tuple[float, float]] | None) -> R
     return run if intervals is None else replace(run, braking=tuple(map(tuple, intervals)))
 
 
-def summary(run: Run, *, mapped: bool = False) -> dict[str, Any]:
+def summary(run: Run, mapping: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """What a person wants to know of a recording before using it.
 
-    mapped : whether its columns are mapped, so that its signs are looked at
+    mapping : that of its columns, whose signs are looked at; None where they go by their names
     """
     from ..engine.measurement import missing_for_identification
 
     missing = list(missing_for_identification(run))
     suggestions = []
-    if mapped:
+    if mapping is not None:
+        from ..engine.mapping.mapping import mapping_from_json
         from ..engine.mapping.signs import check_signs
 
-        suggestions = [asdict(one) for one in check_signs(run)]
+        sure = mapping_from_json(mapping).sure_signs
+        suggestions = [asdict(one) for one in check_signs(run, sure)]
     return {
         "needs_mapping": False,
         "samples": len(run.time),

@@ -55,7 +55,7 @@ def _condition(
             vehicle = vehicle_to_json(vehicle_from_json(told))
         asked = {"steps": steps_to_json(steps), "vehicle": vehicle}
     done = replace(kept, conditioning=asked)
-    found = summary(services.recordings.run(done), mapped=kept.mapping is not None)
+    found = summary(services.recordings.run(done), kept.mapping)
     return _shown(services, sid, services.store.set_conditioning(sid, kept.id, asked, found))
 
 

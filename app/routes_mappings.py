@@ -81,7 +81,7 @@ def _map(services: Services, sid: str, kept: Measurement, body: JsonObject) -> M
     data = services.store.original(kept).read_bytes()
     noise = dict(parse(data, kept.name, kept.noise, mapping).noise)
     done = services.recordings.run(replace(kept, mapping=mapping, noise=noise, summary={}))
-    found = summary(done, mapped=True)
+    found = summary(done, mapping)
     return services.store.set_mapping(sid, kept.id, mapping, noise, found)
 
 

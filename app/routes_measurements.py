@@ -133,9 +133,7 @@ def _note(services: Services, sid: str, kept: Measurement, received: Upload) -> 
         return services.store.set_noise(sid, kept.id, noise, kept.summary)
     data = services.store.original(kept).read_bytes()
     known = dict(parse(data, kept.name, noise, kept.mapping).noise)
-    found = summary(
-        services.recordings.run(replace(kept, noise=known)), mapped=kept.mapping is not None
-    )
+    found = summary(services.recordings.run(replace(kept, noise=known)), kept.mapping)
     return services.store.set_noise(sid, kept.id, known, found)
 
 

@@ -23,7 +23,8 @@ export async function open(row, itsHost) {
   host = itsHost;
   const [found, kept] = await Promise.all([api.columns(row.id), api.mappings()]);
   const begin = found.mapping ?? found.proposed;
-  at = { row, ...found, kept, rows: new Map(), shown: MOST_ROWS, filter: "", onlyMapped: false, outcome: null };
+  at = { row, ...found, kept, rows: new Map(), shown: MOST_ROWS, filter: "", onlyMapped: false,
+    outcome: row.mapping ? row : null };
   take(begin);
   at.applied = !row.needs_mapping;
   const first = found.columns.find((one) => at.entries.has(one.index) && doubt(at.entries.get(one.index), one))
@@ -113,12 +114,16 @@ function head() {
 
 function signRow({ channel, sentence }) {
   return h("li", {}, h("span", { className: "grow" }, sentence),
-    h("button", { type: "button", "aria-label": `Flip ${channel}`, on: { click: () => flip(channel) } }, "Flip"));
+    h("button", { type: "button", "aria-label": `Keep ${channel}`, title: "The sign is right; it is not asked about again",
+      on: { click: () => sign(channel, { sign_sure: true }) } }, "Keep"),
+    h("button", { type: "button", "aria-label": `Flip ${channel}`, title: "Turn the sign over",
+      on: { click: () => sign(channel) } }, "Flip"));
 }
 
-async function flip(channel) {
+/** Confirm the sign of a channel, or turn it over, and apply that. */
+async function sign(channel, confirmed = null) {
   const [index, entry] = [...at.entries].find(([, one]) => one.channel === channel);
-  at.entries.set(index, { ...entry, sign: -entry.sign });
+  at.entries.set(index, { ...entry, ...(confirmed ?? { sign: -entry.sign, sign_sure: false }) });
   if (!(await apply())) at.entries.set(index, entry);
   show();
 }
@@ -223,11 +228,11 @@ function standIns(column, entry) {
   if (!found.length || !entry) return null;
   const values = found.map(({ value }) => value);
   const box = h("input", { type: "checkbox", checked: values.every((value) => entry.missing?.includes(value)),
-    "aria-label": `Treat ${values.join(", ")} of ${name} as gaps`,
+    "aria-label": `Take ${values.join(", ")} of ${name} as missing`,
     on: { change: () => edit(column, { missing: box.checked ? values : [] }) } });
   return h("label", { className: "stand-in",
     title: found.map(({ value, samples }) => `${value} in ${samples} samples, far outside the rest`).join("; ") },
-  box, `${values.map((value) => units.plain(value)).join(", ")} as gaps`);
+  box, `${values.map((value) => units.plain(value)).join(", ")} as missing`);
 }
 
 function channelSelect(column) {
@@ -295,13 +300,13 @@ function unitField(column) {
 
 function signButton(column) {
   const element = h("button", { type: "button", className: "sign", "aria-label": `Turn ${column.name} over`,
-    on: { click: () => edit(column, { sign: -at.entries.get(column.index).sign }) } });
+    on: { click: () => edit(column, { sign: -at.entries.get(column.index).sign, sign_sure: false }) } });
   return { element, refresh: (entry) => {
     element.hidden = !entry;
     if (!entry) return;
     element.setAttribute("aria-pressed", entry.sign < 0);
     element.textContent = entry.sign < 0 ? "−" : "+";
-    element.title = `${entry.sign < 0 ? "Turned over" : "As in the file"}; ${entry.channel} is positive ` +
+    element.title = `${entry.sign < 0 ? "Turned over" : "As in the file"}${entry.sign_sure ? ", confirmed" : ""}; ${entry.channel} is positive ` +
       `${units.channel(entry.channel).sign ?? "as it is"}`;
   } };
 }
@@ -399,7 +404,7 @@ async function apply() {
 /** Lead to the column that a refusal is about: it names the column or its channel. */
 function showWrong(text) {
   const [index] = [...at.entries].find(([one, { channel }]) =>
-    text.includes(`${channel}:`) || text.includes(`column ${at.columns[one].name}`)) ?? [];
+    text.includes(`${channel}:`) || text.includes(`mapped as ${channel},`) || text.includes(`column ${at.columns[one].name}`)) ?? [];
   if (index === undefined) return;
   select(index);
   at.rows.get(index)?.scrollIntoView({ block: "nearest" });

@@ -50,13 +50,13 @@ function gain(column, entry, edit) {
 
 function missing(column, entry, edit) {
   const field = h("input", { type: "text", value: entry.missing?.join(", ") ?? "", placeholder: "none",
-    "aria-label": `Numbers of ${column.name} that stand for gaps`,
+    "aria-label": `Missing numbers of ${column.name}`,
     on: { change: () => {
       const found = field.value.split(/[,;\s]+/).filter(Boolean).map(Number);
       field.setCustomValidity(found.every(Number.isFinite) ? "" : "Write numbers, such as -64, 999.");
       if (field.reportValidity()) edit({ missing: field.value.trim() || entry.missing ? found : null });
     } } });
-  return h("label", { className: "block" }, "Numbers that stand for gaps", field);
+  return h("label", { className: "block", title: "Numbers that stand for nothing measured" }, "Missing numbers", field);
 }
 
 /** Draw what the service says of the column; once asked, another unit or sign is only drawn anew. */

@@ -42,7 +42,7 @@ def channels(options: Namespace) -> None:
 def _findings(path: str, mapping: ChannelMapping) -> list[str]:
     """What is doubtful in the run that a mapping makes, its signs included."""
     run = read_recording(path, mapping)
-    return [*run.warnings, *(one.sentence for one in check_signs(run))]
+    return [*run.warnings, *(one.sentence for one in check_signs(run, mapping.sure_signs))]
 
 
 def _print(found: Survey) -> None:

@@ -210,8 +210,8 @@ def _refuse_stand_ins(values: Array, place: str) -> None:
         listed = ", ".join(f"{one.value:g}" for one in found)
         counted = " and ".join(f"{one.value:g} in {one.samples} samples" for one in found)
         raise MeasurementError(
-            f"{place} is {counted}, far outside the rest; if that stands for nothing measured, map"
-            f' it with "missing": [{listed}], else with "missing": [].'
+            f"{place} is {counted}, far outside the rest; if that stands for nothing measured,"
+            f" give {listed} as missing, else say that no number is missing."
         )
 
 
@@ -237,8 +237,8 @@ def _bridge(
         begin = time[known[gaps[widest]]]
         raise MeasurementError(
             f"{place} has no number between {begin:.4g} and {begin + spans[widest]:.4g} s, longer"
-            f" than the {longest:g} s that are bridged; cut the recording there or leave the"
-            " column out."
+            f" than the {longest:g} s that are bridged; bridge more, cut the recording there or"
+            " leave the column out."
         )
     bridged = int(known[-1] - known[0] + 1 - known.size)
     warnings.append(

@@ -270,7 +270,7 @@ def _warnings(
         for value, samples in numbers.stand_ins:
             said.append(
                 f"{name} is {value:g} in {samples} samples, far outside the rest; if that stands"
-                f' for nothing measured, map it with "missing": [{value:g}].'
+                f" for nothing measured, give {value:g} as missing."
             )
         if numbers.missing:
             said.append(f"{name} has no number in {numbers.missing} of {numbers.samples} samples.")

@@ -3,7 +3,8 @@
 It is kept as JSON and used again for every file whose columns have the same names:
 
     {"columns": [{"column": "Car.Pitch", "group": "", "channel": "chassis.pitch", "unit": "deg",
-                  "sign": -1, "gain": 1.0, "missing": [-64], "note": "name and unit"}],
+                  "sign": -1, "gain": 1.0, "missing": [-64], "note": "name and unit",
+                  "sign_sure": false}],
      "longest_gap": 0.1, "step": null}
 """
 
@@ -36,6 +37,7 @@ class MappedColumn:
     missing : numbers that stand for "nothing measured"; None where nobody has looked for such
         numbers, so that they are refused where there are some
     note : how the entry came about
+    sign_sure : whether somebody has confirmed the sign, so that no more doubt of it is told
     """
 
     column: str
@@ -46,6 +48,7 @@ class MappedColumn:
     gain: Annotated[float, Range("1", 1e-9, 1e9)] = 1.0
     missing: tuple[float, ...] | None = None
     note: str = ""
+    sign_sure: bool = False
 
     def __post_init__(self) -> None:
         """Refuse a channel, a unit or a sign that does not exist."""
@@ -97,6 +100,11 @@ class ChannelMapping:
                 )
             channels[one.channel] = one.column
             columns[one.group, one.column] = one.channel
+
+    @property
+    def sure_signs(self) -> frozenset[str]:
+        """Channels whose signs somebody has confirmed."""
+        return frozenset(one.channel for one in self.columns if one.sign_sure)
 
     def fits(self, columns: "Places") -> bool:
         """Whether a file has every column."""

@@ -8,7 +8,7 @@ all ways to turn channels over the one is taken that has the greatest sum of the
 every channel it turns; it is offered, never done.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -69,8 +69,11 @@ class SignSuggestion:
     flip: bool = True
 
 
-def check_signs(run: Run) -> tuple[SignSuggestion, ...]:
-    """Channels that are probably turned over; nothing where the run does not tell."""
+def check_signs(run: Run, sure: Collection[str] = ()) -> tuple[SignSuggestion, ...]:
+    """Channels that are probably turned over; nothing where the run does not tell.
+
+    sure : channels whose signs somebody has confirmed, of which nothing is said
+    """
     slow = _slow_motion(run)
     wheels = [name for name in WHEEL_CHANNELS if name in slow]
     if len(wheels) < len(WHEEL_CHANNELS):
@@ -88,7 +91,9 @@ def check_signs(run: Run) -> tuple[SignSuggestion, ...]:
         if sum_of_all > value:
             best, value = turned, sum_of_all
     return tuple(
-        _suggestion(name, slow, best, pairs) for name in names if best[name] < 0 and name in slow
+        _suggestion(name, slow, best, pairs)
+        for name in names
+        if best[name] < 0 and name in slow and name not in sure
     )
 
 
@@ -105,8 +110,8 @@ def _suggestion(
     return SignSuggestion(
         name,
         round(correlation, 3),
-        f"{name} runs against {against} below {SLOW:g} Hz (correlation {correlation:.2f}); turn it"
-        " over by the sign -1, unless the other one is wrong.",
+        f"{name} runs against {against} below {SLOW:g} Hz (correlation {correlation:.2f}); turn"
+        " its sign over, unless the other one is wrong.",
     )
 
 

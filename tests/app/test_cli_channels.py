@@ -118,7 +118,7 @@ def test_what_cannot_be_applied_yet_is_said_with_the_guess(foreign, capsys):
     assert main(["channels", "foreign.csv"]) == 0
     printed = capsys.readouterr().out
     assert "Warning: Aufbauhub is -9999 in 5 samples, far outside the rest" in printed
-    assert 'map it with "missing": [-9999], else with "missing": []' in printed
+    assert "give -9999 as missing, else say that no number is missing" in printed
 
 
 def test_of_a_file_that_says_nothing_everything_is_left_to_a_person(tmp_path, monkeypatch, capsys):

@@ -105,9 +105,14 @@ def test_what_is_proposed_can_be_put_and_signs_are_offered(visitor, kept):
     [offered] = found["sign_suggestions"]
     assert (offered["channel"], offered["flip"]) == ("chassis.pitch", True)
     assert offered["correlation"] < -0.5
-    assert "turn it over" in offered["sentence"]
+    assert "turn its sign over" in offered["sentence"]
     assert visitor.get(path).json() == found
     assert visitor.get(f"{path}/columns").json()["mapping"] == proposed
+    next(one for one in proposed["columns"] if one["channel"] == "chassis.pitch")["sign_sure"] = (
+        True
+    )
+    sure = visitor.put(f"{path}/mapping", json=proposed).json()
+    assert sure == found | {"mapping": proposed, "sign_suggestions": []}
 
 
 def test_a_mapped_file_is_a_measurement_like_any_other(visitor, kept):

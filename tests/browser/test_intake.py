@@ -93,8 +93,21 @@ def test_a_foreign_csv_is_mapped_corrected_flipped_and_its_mapping_kept(visitor)
     assert page.locator(".doubted", has_text="taken twice").count() == 0
 
     visitor.click("#apply-mapping")
+    keep = page.get_by_role("button", name="Keep chassis.pitch")
+    visitor.wait(keep.is_visible, "the sign is offered")
+    # One that is kept is done with; turning it by hand asks about it anew.
+    keep.click()
+    visitor.until("ridetune.state('measurements').at(-1).sign_suggestions.length === 0")
+    assert "confirmed" in page.get_by_label("Turn Nickwinkel over").get_attribute("title")
+    for _ in range(2):
+        page.get_by_label("Turn Nickwinkel over").click()
+    visitor.click("#apply-mapping")
     flip = page.get_by_role("button", name="Flip chassis.pitch")
-    visitor.wait(flip.is_visible, "the sign is offered")
+    visitor.wait(flip.is_visible, "the sign is offered again")
+    page.keyboard.press("Escape")
+    # It is still there when the stage is opened once more.
+    assert page.locator("#next-stage").inner_text() == "Check signs"
+    page.click("#next-stage")
     flip.click()
     visitor.until("ridetune.state('measurements').at(-1).sign_suggestions.length === 0")
     kept = newest(visitor)

@@ -220,7 +220,7 @@ def test_numbers_that_stand_for_nothing_are_refused_until_they_are_named(value):
     mapping, table = with_height(dropped(9, value))
     said = refusal(mapping, table)
     assert f"is {value:g} in 9 samples, far outside the rest" in said
-    assert f'map it with "missing": [{value:g}], else with "missing": []' in said
+    assert f"give {value:g} as missing, else say that no number is missing" in said
     kept = apply(*with_height(dropped(9, -64.0), missing=()))
     assert kept["chassis.z"].min() == pytest.approx(-0.064)
 
@@ -260,7 +260,9 @@ def test_samples_without_a_time_are_left_out():
 
 
 def test_a_mapping_comes_back_from_its_file(tmp_path):
-    entry = MappedColumn("h", "chassis.z", "mm", "IMU", -1, 1.5, (-64.0, 1e30), "name and unit")
+    entry = MappedColumn(
+        "h", "chassis.z", "mm", "IMU", -1, 1.5, (-64.0, 1e30), "name and unit", True
+    )
     mapping = ChannelMapping((CLOCK, entry), 0.05, 0.002)
     path = tmp_path / "mapping.json"
     path.write_text(json.dumps(mapping_to_json(mapping)))

@@ -41,6 +41,7 @@ def test_each_channel_turned_over_is_offered_to_be_turned_back(name):
     assert -1.0 <= one.correlation < -0.5
     assert one.sentence.startswith(f"{name} runs against ")
     assert f"(correlation {one.correlation:.2f})" in one.sentence
+    assert name not in [one.channel for one in check_signs(turned(drive("2"), name), [name])]
 
 
 @pytest.mark.parametrize(
