@@ -8,8 +8,9 @@ import * as units from "./units.js";
 
 /** Ends of the bars' scale, standard error over value. */
 const LEAST = 1e-3;
-const MOST = 1;
-const TICKS = [0.01, 0.1];
+const MOST = 10;
+const TICKS = [0.01, 0.1, 1];
+const LABELLED = [0.01, 1];
 const RANK = { no: 0, weakly: 1, yes: 2 };
 /** Shown first; the rest on demand. */
 const FIRST = 6;
@@ -121,9 +122,9 @@ function detail(one, { drive, see }) {
 function bars({ parameters: after }) {
   const { parameters: now } = advice.now;
   return h("table", { className: "before-after" },
-    h("thead", {}, h("tr", {}, h("th", { scope: "col" }, ""), h("th", { scope: "col", title: "Standard error over value; the scale beside is in per cent" }, "Error now"),
+    h("thead", {}, h("tr", {}, h("th", { scope: "col" }, ""), h("th", { scope: "col", title: "Standard error over value; the scale beside is logarithmic" }, "Error now"),
       h("th", { scope: "col" }, "then"), h("th", { scope: "col", className: "axis" },
-        [LEAST, ...TICKS, MOST].map((at) => place(h("span", {}, String(100 * at)), at))))),
+        LABELLED.map((at) => place(h("span", {}, `${100 * at} %`), at))))),
     h("tbody", {}, now.map((one, i) => {
       const then = after.find(({ name }) => name === one.name) ?? after[i];
       const [before, later] = [relative(one), relative(then)];

@@ -97,7 +97,7 @@ function say({ trouble, now }) {
 }
 
 function legend() {
-  const other = { baseline: "baseline", "7dof": "7-DOF model", none: null }[get("compare")];
+  const other = { baseline: "baseline", "7dof": "7-DOF", none: null }[get("compare")];
   $("#legend").replaceChildren(
     ...RUNS.map(({ key, label }) => [key, key === "reference" ? other : label])
       .filter(([key, text]) => text && (key !== "measured" || get("ride")?.kind === "measurement"))

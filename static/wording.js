@@ -9,7 +9,7 @@ const escaped = (text) => text.replace(/[.*+?^${}()|[\]\\/]/g, "\\$&");
 
 /** A sentence as nodes: parameters by symbol and label, their numbers as the sliders show them. */
 export function worded(text) {
-  return inDisplayUnits(text).split(PATH).filter(Boolean).map((part) => {
+  return inDisplayUnits(text).replace(/(\d) %/g, "$1\u00a0%").split(PATH).filter(Boolean).map((part) => {
     const row = units.parameter(part);
     if (row) {
       return h("span", { title: part }, symbol(row.symbol), ` ${row.label.toLowerCase()}`);
