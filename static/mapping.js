@@ -1,7 +1,7 @@
 // Columns of a file as channels: what is guessed and why, corrected by a person, applied, kept.
 
 import * as api from "./api.js";
-import { breakable, h, inPlace } from "./dom.js";
+import { $, breakable, h, inPlace } from "./dom.js";
 import * as detail from "./mapping_detail.js";
 import {
   BY_HAND, USUAL_UNITS, columnsOf, doubt, entriesOf, entryFor, isRaw, needs, offered,
@@ -126,6 +126,8 @@ async function sign(channel, confirmed = null) {
   at.entries.set(index, { ...entry, ...(confirmed ?? { sign: -entry.sign, sign_sure: false }) });
   if (!(await apply())) at.entries.set(index, entry);
   show();
+  // The button is gone; the focus goes to the next one that is asked about, else to Apply.
+  ($(".signs button", parts.head) ?? parts.apply).focus();
 }
 
 /** Which clock the run will have, where the columns have several. */

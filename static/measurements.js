@@ -2,7 +2,7 @@
 // driven; see how far each is on its way from file to run; look, delete.
 
 import * as api from "./api.js";
-import { $, breakable, capital, h, inPlace } from "./dom.js";
+import { $, breakable, h, inPlace } from "./dom.js";
 import { RECORDINGS, kindOfJson, requireNotes } from "./file_kinds.js";
 import * as intake from "./intake.js";
 import { lacks, nameOf, original } from "./names.js";
@@ -196,7 +196,7 @@ function show() {
       h("span", { className: "hint" }, parts.busy ? `Reading ${parts.busy} …` : "or drop them here")),
     ...failures.map(({ name, error }) =>
       h("div", { className: "problem", role: "alert" },
-        h("strong", {}, `${name} was not taken`), h("p", {}, capital(error.message.replace(`${name}: `, ""))))),
+        h("strong", {}, `${name} was not taken`), h("p", {}, error.message))),
     ...(rows.length ? [table(rows)] : [h("p", { className: "empty" },
       "No measurement yet. Add a recording: CSV, MDF, MAT, HDF5, TDMS, UFF58, RPC III, Parquet or " +
       "CarMaker ERG. Its columns may have any names; the page helps to map them to channels.")]),

@@ -98,6 +98,7 @@ def test_a_foreign_csv_is_mapped_corrected_flipped_and_its_mapping_kept(visitor)
     # One that is kept is done with; turning it by hand asks about it anew.
     keep.click()
     visitor.until("ridetune.state('measurements').at(-1).sign_suggestions.length === 0")
+    assert page.evaluate("document.activeElement.id") == "apply-mapping"
     assert "confirmed" in page.get_by_label("Turn Nickwinkel over").get_attribute("title")
     for _ in range(2):
         page.get_by_label("Turn Nickwinkel over").click()

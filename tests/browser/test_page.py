@@ -244,6 +244,20 @@ def test_tabs_and_help_work_by_keyboard(visitor):
     assert not visitor.element("#help-dialog").is_visible()
 
 
+def test_the_page_is_whole_from_800_to_1920_pixels(visitor):
+    """No sideways scrolling; tabs and legend of the charts in one row where there are columns."""
+    for width in (800, 1000, 1440, 1920):
+        visitor.page.set_viewport_size({"width": width, "height": 800})
+        visitor.page.wait_for_timeout(100)
+        assert visitor.page.evaluate("document.documentElement.scrollWidth") == width
+        main = visitor.page.evaluate(
+            "(({ scrollWidth: w, clientWidth: c }) => [w, c])(document.querySelector('main'))"
+        )
+        assert main[0] == main[1]
+        if width >= 1440:
+            assert visitor.element("#chart-tabs").bounding_box()["height"] < 40
+
+
 def test_two_browsers_do_not_see_each_other(visit, service):
     one, other = visit().open(service.address), visit().open(service.address)
     press(one, "#slider-front-suspension-stiffness", "PageUp")

@@ -80,6 +80,8 @@ def test_a_fit_tells_what_its_run_determines_and_what_to_drive_next(analyst):
     best = visitor.look("ridetune.advice().candidates[0]")
     assert best["key"].startswith("brake")
     assert visitor.element(".before-after tbody tr").count() == 12
+    least, most = (one.bounding_box() for one in visitor.element(".before-after .axis span").all())
+    assert least["x"] + least["width"] < most["x"]
     visitor.click("#see-candidate")
     visitor.until("ridetune.state('now')?.head.mode === 'road'")
     assert visitor.look("ridetune.state('now').head.duration") == pytest.approx(best["duration"])
