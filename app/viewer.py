@@ -26,6 +26,8 @@ from .errors import NotFound
 from .package_files import package_folder
 
 FOG = (18, 22, 27)
+GROUND = (120, 124, 130)
+"""Colour of the light from below."""
 MESSAGE_BYTES = 64 << 20
 UNWATCHED_SECONDS = 600.0
 """How long a viewer without a tab is kept."""
@@ -55,6 +57,9 @@ class Viewer:
         self.server.initial_camera.look_at = TARGET
         self.server.initial_camera.fov = 0.62
         self.server.scene.world_axes.visible = False
+        # Where there is no graphics card the usual environment map takes seconds to prepare.
+        self.server.scene.configure_environment_map(None)
+        self.server.scene.add_light_hemisphere("/light", ground_color=GROUND, intensity=1.5)
         self.server.scene.configure_default_lights(cast_shadow=False)
         self.server.scene.configure_fog(14.0, 60.0, color=FOG)
 
