@@ -94,8 +94,7 @@ def _clock_unit(table: "Table", index: int) -> tuple[str, float]:
     """The unit in which a column's time is shown, and what its clock's numbers are multiplied by:
     s, else the clock's own unit, else the number of the sample.
     """
-    from ..engine.mapping.sizes import plain_unit
-    from ..engine.units import UnitError, to_si
+    from ..engine.units import UnitError, plain_unit, to_si
 
     column = table.columns[index]
     if column.clock is None:

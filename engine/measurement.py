@@ -151,7 +151,7 @@ def run_from_table(
     """The run that some columns of a table make, checked.
 
     chosen : the columns, each another channel; without one for the time, it is that of the
-        columns' clocks, the finest where they differ (see `one_clock`)
+        columns' clocks, the finest where they differ (see `on_one_clock`)
     warnings : what is already known to be doubtful, which goes first
     """
     source, found = table.source, list(warnings)

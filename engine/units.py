@@ -67,10 +67,31 @@ _ALIASES = {
 _ACCELERATION_ALIASES = {"g": "g_0", "gn": "g_0", "g_n": "g_0", "mg": "mg_0"}
 """Words that mean standard gravity, but only where an acceleration is expected."""
 
+_SPELLINGS = {
+    "grad": "deg",
+    "dps": "deg/s",
+    "sek": "s",
+    "sekunde": "s",
+    "sekunden": "s",
+    "mps": "m/s",
+    "m/s/s": "m/s^2",
+    "km/std": "km/h",
+    "g's": "g",
+}
+"""Unit texts of test departments; pint takes Grad for the gradian."""
+
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻−", "0123456789--")
 _WORD = r"[A-Za-z\u00b5\u03bc°%]+(?:_[A-Za-z0-9]+)?"
 _SEPARATOR = re.compile(r"\s*[*·⋅./]\s*|\s+")
 _FACTOR = re.compile(rf"(?P<word>{_WORD})(?:(?:\^|\*\*)?(?P<exponent>[+-]?\d)(?![\d.]))?")
+
+
+@lru_cache(maxsize=4096)
+def plain_unit(text: str) -> str:
+    """A file's unit as `to_si` reads it: without brackets, m|s2 as m/s2; "" for none."""
+    text = re.sub(r"^[\[(](.*)[\])]$", r"\1", text.strip()).strip().replace("|", "/")
+    text = re.sub(r"(?<![A-Za-z])m?sec(?![A-Za-z])", lambda one: one[0].replace("sec", "s"), text)
+    return _SPELLINGS.get(text.lower(), "" if text in {"-", "--", "1", "none", "n/a"} else text)
 
 
 def to_si(text: str, si_unit: str) -> tuple[float, float]:

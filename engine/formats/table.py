@@ -126,16 +126,3 @@ class HeldTable(Table):
                 " ask for it when the file is opened."
             )
         return held
-
-
-def time_of(table: Table, index: int) -> Array | None:
-    """The time (samples,) of one column as its file has it; None where the file tells none.
-
-    It is in the unit of the column of time where there is one, else in s.
-    """
-    column = table.columns[index]
-    if column.clock is not None:
-        return table.values(column.clock)
-    if column.step is None:
-        return None
-    return column.start + column.step * np.arange(column.samples, dtype=np.float64)

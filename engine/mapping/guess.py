@@ -13,6 +13,7 @@ from scipy.optimize import linear_sum_assignment
 from ..channels import ChannelInfo, channel, find_channel
 from ..csv_table import split_title
 from ..formats.table import Column
+from ..units import plain_unit
 from .mapping import ChannelMapping, MappedColumn, Places
 from .names import readings
 from .numbers import Statistics
@@ -22,7 +23,6 @@ from .sizes import (
     UPRIGHT,
     TakenUnit,
     measured_by,
-    plain_unit,
     reads_gravity,
     size_of,
     taken_unit,

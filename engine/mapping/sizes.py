@@ -7,7 +7,6 @@ and said why.
 """
 
 import math
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -85,19 +84,6 @@ ALTERNATIVE = 2.0
 RARE = 2.5
 """What the third unit of a list and later ones must be nearer by."""
 
-_SPELLINGS = {
-    "grad": "deg",
-    "dps": "deg/s",
-    "sek": "s",
-    "sekunde": "s",
-    "sekunden": "s",
-    "mps": "m/s",
-    "m/s/s": "m/s^2",
-    "km/std": "km/h",
-    "g's": "g",
-}
-"""Unit texts of test departments; pint takes Grad for the gradian."""
-
 
 @dataclass(frozen=True, slots=True)
 class TakenUnit:
@@ -112,14 +98,6 @@ class TakenUnit:
     belief: float
     reason: str
     doubted: bool = False
-
-
-@lru_cache(maxsize=4096)
-def plain_unit(text: str) -> str:
-    """A file's unit as `to_si` reads it: without brackets, m|s2 as m/s2; "" for none."""
-    text = re.sub(r"^[\[(](.*)[\])]$", r"\1", text.strip()).strip().replace("|", "/")
-    text = re.sub(r"(?<![A-Za-z])m?sec(?![A-Za-z])", lambda one: one[0].replace("sec", "s"), text)
-    return _SPELLINGS.get(text.lower(), "" if text in {"-", "--", "1", "none", "n/a"} else text)
 
 
 @lru_cache(maxsize=4096)

@@ -70,9 +70,9 @@ def test_what_a_native_file_is_doubted_for_is_doubted_here():
     [
         (
             np.where(SAMPLE == 7, TIME[6], TIME),
-            "lap: sample 8: time 0.06 s does not come after",
+            "lap: the time of height: sample 8: time 0.06 s does not come after",
         ),
-        (np.full_like(TIME, np.nan), "lap: the time has fewer than two numbers"),
+        (np.full_like(TIME, np.nan), "lap: the time of height has fewer than two numbers"),
     ],
 )
 def test_time_that_does_not_run_is_refused(time, said):
@@ -151,7 +151,7 @@ def test_other_clocks_are_interpolated_to_the_finest_over_what_all_share():
     np.testing.assert_allclose(run["chassis.z"], 3e-3 * run.time, rtol=1e-12)
     np.testing.assert_allclose(run["chassis.v_x"], 7.0 / 3.6 * run.time, rtol=1e-12)
     shared, interpolated = run.warnings
-    assert shared.startswith("Only the time from 1 to 4.995 s has all the mapped columns")
+    assert shared.startswith("Only the time from 1 to 4.995 s has all the columns")
     assert interpolated == "Interpolated to the times of height: speed (every 0.1 s)."
 
 
@@ -253,7 +253,7 @@ def test_samples_without_a_time_are_left_out():
         ChannelMapping((CLOCK, HEIGHT)), held({"Time": ("s", time), "height": ("", wave())})
     )
     assert run.time[-1] == pytest.approx(4.0)
-    assert "The time has no number in 99 of 500 samples" in run.warnings[0]
+    assert "The time of height has no number in 99 of 500 samples" in run.warnings[0]
 
 
 # --- templates --------------------------------------------------------------------------------
