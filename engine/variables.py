@@ -44,8 +44,7 @@ class Variable:
 
     def value(self, variable: float) -> float:
         """The number at a variable, kept between the bounds against rounding."""
-        ratio = math.copysign(math.exp(variable), self.lower) if self.logarithmic else variable
-        return min(max(ratio * self.scale, self.lower), self.upper)
+        return min(max(self._unbounded(variable), self.lower), self.upper)
 
     def slope(self, variable: float) -> float:
         """d value / d variable."""
@@ -55,16 +54,28 @@ class Variable:
         """Values from so far below a variable to so far above it, bounds aside. An end is infinite
         where it is, or where the logarithm puts it a factor FARTHEST or more away.
         """
-        low, high = self._end(variable, -below), self._end(variable, above)
+        value = self._unbounded(variable)
+        low, high = (self.moved(value, change) for change in (-below, above))
         return (low, high) if low < high else (high, low)
 
-    def _end(self, variable: float, change: float) -> float:
-        if not self.logarithmic:
-            return (variable + change) * self.scale
-        sign = math.copysign(1.0, self.lower)
-        if abs(change) > math.log(FARTHEST):
-            return sign * change * math.inf
-        return sign * math.exp(variable + change) * self.scale
+    def moved(self, value: float, change: float) -> float:
+        """Where a step of the variable leads from a value, bounds aside (see `moved`)."""
+        return moved(value, change, logarithmic=self.logarithmic, scale=self.scale)
+
+    def _unbounded(self, variable: float) -> float:
+        ratio = math.copysign(math.exp(variable), self.lower) if self.logarithmic else variable
+        return ratio * self.scale
+
+
+def moved(value: float, change: float, *, logarithmic: bool, scale: float = 1.0) -> float:
+    """Where a step of a number's variable leads from a value; infinite where the logarithm puts it
+    a factor FARTHEST or more away.
+    """
+    if not logarithmic:
+        return value + change * scale
+    if abs(change) > math.log(FARTHEST):
+        return math.copysign(math.inf, change * value)
+    return value * math.exp(change)
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ from .fit import CombinationEstimate, Direction, ParameterEstimate, Verdict, det
 from .parameters import parameter
 from .uncertainty import Uncertainty
 from .units import after_number, in_percent
-from .variables import FARTHEST
+from .variables import moved
 from .vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -97,10 +97,9 @@ def _gradient(one: Combination, estimates: Sequence[ParameterEstimate], vehicle:
 
 def _moved(one: Combination, of: ParameterEstimate, vehicle: Vehicle, change: float) -> float:
     """q, or its logarithm, with a parameter's variable changed by so much, bounds aside."""
-    free = of.free
-    value = of.value * math.exp(change) if free.logarithmic else of.value + change * free.scale
-    moved = one.value(vehicle.varied({of.name: np.array(value)}))
-    return float(moved if one.signed else np.log(moved))
+    value = of.free.moved(of.value, change)
+    found = one.value(vehicle.varied({of.name: np.array(value)}))
+    return float(found if one.signed else np.log(found))
 
 
 def _held_together(
@@ -126,13 +125,9 @@ def _estimate(
 ) -> CombinationEstimate:
     value, error = one.value(vehicle), errors.error_of(gradient)
     half_width = errors.quantile * error
-    if one.signed:
-        interval = value - half_width, value + half_width
-    else:
-        far = half_width > math.log(FARTHEST)
-        factor = math.inf if far else math.exp(half_width)
-        interval = (-math.inf, math.inf) if far else (value / factor, value * factor)
-        error *= value
+    low, high = (
+        moved(value, change, logarithmic=not one.signed) for change in (-half_width, half_width)
+    )
     return CombinationEstimate(
         name=one.name,
         symbol=one.symbol,
@@ -140,9 +135,9 @@ def _estimate(
         unit=one.unit,
         of=one.of,
         value=value,
-        std_error=error,
-        confidence_interval=interval,
-        determined=determined(value, 0.5 * (interval[1] - interval[0])),
+        std_error=error if one.signed else error * value,
+        confidence_interval=(low, high),
+        determined=determined(value, 0.5 * (high - low)),
     )
 
 
