@@ -70,12 +70,12 @@ class Ending(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class ParameterEstimate:
-    """One identified parameter, SI.
+class Estimate:
+    """One identified number, SI.
 
-    std_error : infinite where the runs do not determine the parameter
+    std_error : infinite where the runs do not determine the number
     confidence_interval : 95 %, an end infinite where the runs leave it open: on both sides of a
-        parameter that they do not determine, beyond a bound at which the search ended
+        number that they do not determine, beyond a bound at which the search ended
     determined : "yes" (95 % half-width under 15 % of |value|), "weakly" (under 50 %) or "no"
         (wider, or at a bound, or when the fit did not converge to the runs)
     """
@@ -96,6 +96,11 @@ class ParameterEstimate:
         """What sentences call it."""
         return self.name
 
+
+@dataclass(frozen=True, slots=True)
+class ParameterEstimate(Estimate):
+    """A parameter of the car."""
+
     @property
     def free(self) -> FreeParameter:
         """What was free, with the search's variable."""
@@ -103,28 +108,17 @@ class ParameterEstimate:
 
 
 @dataclass(frozen=True, slots=True)
-class SensorEstimate:
-    """A quantity of a sensor that was found with the parameters, SI; fields as of
-    `ParameterEstimate`.
+class SensorEstimate(Estimate):
+    """A quantity of a sensor that was found with the parameters.
 
     run : whose own it is, or None where the runs share it
     determined : by the half-width over the value of a gain, over the channel's standard deviation
         in the run for a bias, and over DELAY_MATTERS for a delay
     """
 
-    name: str
     channel: str
     quantity: str
     run: str | None
-    value: float
-    unit: str
-    std_error: float
-    confidence_interval: tuple[float, float]
-    start: float
-    lower: float
-    upper: float
-    at_bound: bool
-    determined: str
 
     @property
     def title(self) -> str:
@@ -147,7 +141,7 @@ class Offer:
 
 @dataclass(frozen=True, slots=True)
 class CombinationEstimate:
-    """A quantity that several parameters make together, SI; fields as of `ParameterEstimate`."""
+    """A quantity that several parameters make together, SI; fields as of `Estimate`."""
 
     name: str
     symbol: str

@@ -10,7 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from .fit import Fit, ParameterEstimate, SensorEstimate
+from .fit import Estimate, Fit
 from .profile import Profile
 from .step_record import step_record_to_json
 from .vehicle_file import vehicle_to_json
@@ -21,8 +21,8 @@ def fit_to_json(fit: Fit) -> dict[str, Any]:
     return plain(
         {
             "vehicle": vehicle_to_json(fit.vehicle),
-            "parameters": [_parameter(one) for one in fit.parameters],
-            "sensors": [_parameter(one) for one in fit.sensors],
+            "parameters": [_estimate(one) for one in fit.parameters],
+            "sensors": [_estimate(one) for one in fit.sensors],
             "fixed_sensors": {name: dict(one) for name, one in fit.fixed_sensors.items()},
             "verdict": asdict(fit.verdict),
             "correlation": fit.errors.correlation.tolist(),
@@ -74,7 +74,7 @@ def write_fit(fit: Fit, path: Path | str) -> None:
     Path(path).write_text(text + "\n", encoding="utf-8")
 
 
-def _parameter(one: ParameterEstimate | SensorEstimate) -> dict[str, Any]:
+def _estimate(one: Estimate) -> dict[str, Any]:
     row = asdict(one)
     row["confidence_interval"] = list(one.confidence_interval)
     return row

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compared_runs import ComparedRun
-from .fit import FittedRun, Minimum, ParameterEstimate, SensorEstimate
+from .fit import Estimate, FittedRun, Minimum, SensorEstimate
 from .problem import Problem
 from .simulation import fit_percent
 from .spikes import despiked
@@ -259,14 +259,12 @@ def _ratio(one: Minimum, other: Minimum, name: str) -> float:
     return abs(first - second) / max(abs(first), abs(second), 1e-9)
 
 
-def bound_findings(estimates: Sequence[ParameterEstimate | SensorEstimate]) -> list[str]:
+def bound_findings(estimates: Sequence[Estimate]) -> list[str]:
     """What is at a bound."""
     return [_at_bound(one) for one in estimates if one.at_bound]
 
 
-def undetermined_findings(
-    estimates: Sequence[ParameterEstimate | SensorEstimate], errors: Uncertainty
-) -> list[str]:
+def undetermined_findings(estimates: Sequence[Estimate], errors: Uncertainty) -> list[str]:
     """What the runs do not determine, grouped by what can be done about it.
 
     errors : of all estimates, in their order
@@ -306,7 +304,7 @@ def undetermined_findings(
     return found
 
 
-def _at_bound(one: ParameterEstimate | SensorEstimate) -> str:
+def _at_bound(one: Estimate) -> str:
     at_lower = one.value - one.lower < one.upper - one.value
     side, bound = ("lower", one.lower) if at_lower else ("upper", one.upper)
     said = f"{one.title} is at its {side} bound, {bound:.4g}{after_number(one.unit)}"

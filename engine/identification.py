@@ -8,7 +8,6 @@ the car's parameters, whatever the sensors are (`Uncertainty.marginal`). docs/id
 tells what the paper's campaign can and cannot determine.
 """
 
-import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,6 +19,7 @@ from scipy.stats.qmc import Halton
 from .channels import WHEEL_CHANNELS
 from .compared_runs import ComparedRun
 from .errors import ProblemError
+from .estimates import estimates
 from .fit import (
     CONVERGED,
     Ending,
@@ -30,7 +30,6 @@ from .fit import (
     ParameterEstimate,
     Progress,
     SensorEstimate,
-    determined,
 )
 from .fit_findings import (
     Histories,
@@ -45,15 +44,14 @@ from .fit_findings import (
 from .initial_state import swings_in
 from .multistart import refined_starts, spread
 from .noise_rounds import with_found_noise
+from .offers import offers
 from .prior_checks import disagreements, prior_checks
 from .problem import FreeParameter, Problem
 from .residuals import FAILED_TRIAL, Residuals, Simulate
 from .search import Found, Search
 from .search_settings import MOST_STARTS
-from .sensor_findings import estimated, offers
 from .simulation import rims_batch
-from .uncertainty import Uncertainty, information, uncertainty
-from .variables import Variable
+from .uncertainty import information, uncertainty
 from .verdict import verdict, without_verdict
 from .whiteness import whiteness, whiteness_findings
 
@@ -68,9 +66,6 @@ MOST_EVALUATIONS = 100
 EVALUATIONS_ON_A_FAULT = 40
 """Trial points spent when a channel probably has the wrong sign or unit: enough should it turn out
 to be right, no more because a fit to the wrong one means nothing."""
-
-AT_BOUND = 1e-3
-"""A value nearer to a bound than this share of the range between the bounds is at it."""
 
 
 SCATTERED_STARTS = 32
@@ -140,17 +135,17 @@ def identify(
     of_all = uncertainty(sum(residuals.of_priors(), start=said))
     errors = of_all.marginal(len(problem.free))
     priors = prior_checks(residuals, solution, said)
-    estimates, sensors = _estimates(problem, solution.x, of_all, beyond=solution.beyond())
+    parameters, sensors = estimates(problem, solution.x, of_all, beyond=solution.beyond())
     fitted = residuals.model(solution.x)
     driven = _well_driven(problem)
     faults = channel_faults(driven, start, fitted)
     wrong = bool(faults) or len(driven) < len(problem.runs)
-    outcome = Outcome.DOUBTFUL if wrong else _outcome(solution, estimates, sensors, residuals)
+    outcome = Outcome.DOUBTFUL if wrong else _outcome(solution, parameters, sensors, residuals)
     converged = outcome in CONVERGED
     runs = tuple(_fitted_run(seen, residuals, r) for seen in problem.runs)
     minima = tuple(_minimum(ended, residuals) for ended in reached)
     if not converged:
-        estimates = tuple(replace(one, determined="no") for one in estimates)
+        parameters = tuple(replace(one, determined="no") for one in parameters)
         sensors = tuple(replace(one, determined="no") for one in sensors)
     warnings = [
         *(warning for seen in problem.runs for warning in seen.inputs.warnings),
@@ -166,16 +161,16 @@ def identify(
             *outlier_findings(problem, runs),
             *disagreements(priors, problem.free),
             *whiteness_findings(tests),
-            *bound_findings([*estimates, *sensors]),
+            *bound_findings([*parameters, *sensors]),
         ]
     if converged:
-        warnings += undetermined_findings([*estimates, *sensors], of_all)
+        warnings += undetermined_findings([*parameters, *sensors], of_all)
     return Fit(
-        verdict=verdict(estimates, errors, problem.vehicle_at(solution.x))
+        verdict=verdict(parameters, errors, problem.vehicle_at(solution.x))
         if converged
-        else without_verdict(estimates),
+        else without_verdict(parameters),
         vehicle=problem.vehicle_at(solution.x),
-        parameters=estimates,
+        parameters=parameters,
         sensors=sensors,
         fixed_sensors=problem.sensors.fixed,
         cost=float(solution.cost),
@@ -279,48 +274,6 @@ def _failure(problem: Problem) -> str:
     )
 
 
-def _estimates(
-    problem: Problem, x: Array, errors: Uncertainty, *, beyond: Array
-) -> tuple[tuple[ParameterEstimate, ...], tuple[SensorEstimate, ...]]:
-    """Parameters and sensors; at a bound nobody has looked further, so the interval is open there
-    and, on this side, reaches to where it would around the point that lies beyond.
-
-    errors : of all variables
-    """
-    parameters, sensors = [], []
-    for place, (one, variable, further, deviation) in enumerate(
-        zip(problem.variables, x.tolist(), beyond.tolist(), errors.std_error.tolist(), strict=True)
-    ):
-        value = one.value(variable)
-        at_bound = _at_bound(one, value)
-        below = above = errors.quantile * deviation
-        if at_bound and variable < 0.5 * sum(map(one.variable, (one.lower, one.upper))):
-            below, above = math.inf, max(0.0, further - variable + above)
-        elif at_bound:
-            below, above = max(0.0, variable - further + below), math.inf
-        interval = one.interval(variable, below, above)
-        std_error = abs(one.slope(variable)) * deviation
-        if place >= len(problem.free):
-            of_sensor = problem.fitted[place - len(problem.free)]
-            sensors.append(estimated(of_sensor, value, std_error, interval, at_bound, problem.runs))
-            continue
-        parameters.append(
-            ParameterEstimate(
-                name=one.name,
-                value=value,
-                unit=one.unit,
-                std_error=std_error,
-                confidence_interval=interval,
-                start=one.start,
-                lower=one.lower,
-                upper=one.upper,
-                at_bound=at_bound,
-                determined=determined(value, 0.5 * (interval[1] - interval[0]), at_bound),
-            )
-        )
-    return tuple(parameters), tuple(sensors)
-
-
 def _fitted_run(seen: ComparedRun, residuals: Residuals, r: Array) -> FittedRun:
     """What was compared in a run, as data."""
     loss = residuals.problem.loss
@@ -352,21 +305,15 @@ def _minimum(ended: list[Found], residuals: Residuals) -> Minimum:
         cut_short=sum(one.ending == Ending.SAME_BASIN for one in ended),
         from_start=any(one.told for one in ended),
         at_bound=tuple(
-            one.name
-            for one, value in zip(problem.free, values, strict=True)
-            if _at_bound(one, value)
+            one.name for one, value in zip(problem.free, values, strict=True) if one.at_bound(value)
         ),
         outcome=lowest.ending,
     )
 
 
-def _at_bound(one: Variable, value: float) -> bool:
-    return min(value - one.lower, one.upper - value) < AT_BOUND * (one.upper - one.lower)
-
-
 def _outcome(
     found: Found,
-    estimates: tuple[ParameterEstimate, ...],
+    parameters: tuple[ParameterEstimate, ...],
     sensors: tuple[SensorEstimate, ...],
     residuals: Residuals,
 ) -> Outcome:
@@ -377,9 +324,9 @@ def _outcome(
         return Outcome.STUCK
     if found.cost > residuals.scatter():
         return Outcome.ASTRAY
-    if any(one.at_bound for one in (*estimates, *sensors)):
+    if any(one.at_bound for one in (*parameters, *sensors)):
         return Outcome.AT_BOUND
-    verdicts = {one.determined for one in estimates}
+    verdicts = {one.determined for one in parameters}
     if "no" in verdicts:
         return Outcome.UNDETERMINED
     return Outcome.WEAKLY if "weakly" in verdicts else Outcome.DETERMINED

@@ -12,6 +12,9 @@ from .parameters import parameter
 FARTHEST = 1e3
 """Factor from a value to the end of its interval beyond which the end is not worth telling."""
 
+AT_BOUND = 1e-3
+"""A value nearer to a bound than this share of the range between the bounds is at it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Variable:
@@ -45,6 +48,18 @@ class Variable:
     def value(self, variable: float) -> float:
         """The number at a variable, kept between the bounds against rounding."""
         return min(max(self._unbounded(variable), self.lower), self.upper)
+
+    def at_bound(self, value: float) -> bool:
+        """Whether a value is at a bound."""
+        return self.at_lower(value) or self.at_upper(value)
+
+    def at_lower(self, value: float) -> bool:
+        """Whether a value is at the lower bound."""
+        return value - self.lower < AT_BOUND * (self.upper - self.lower)
+
+    def at_upper(self, value: float) -> bool:
+        """Whether a value is at the upper bound."""
+        return self.upper - value < AT_BOUND * (self.upper - self.lower)
 
     def slope(self, variable: float) -> float:
         """d value / d variable."""
