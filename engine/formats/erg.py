@@ -16,7 +16,7 @@ import numpy as np
 
 from ..errors import MeasurementError
 from .kinds import ERG_ZIP, erg_pair
-from .listing import Listing, first_text, nearest_clocks, plain
+from .listing import Listing, first_text, plain
 from .table import Array, Column, Table
 
 HEAD_BYTES = 16
@@ -66,16 +66,15 @@ class ErgFile(Table):
             )
         self._records = data[HEAD_BYTES : HEAD_BYTES + samples * record.itemsize].view(record)
         listing = Listing(source, self.kind)
-        taken = []
+        found = []
         for name, kind_of_field in fields:
             if kind_of_field.lstrip("<>|")[0] in "fiu":
-                taken.append(name)
+                unit = units[name] or ("s" if name.lower() == "time" else "")
+                column = Column(plain(name), unit, samples)
+                found.append(((name,), column, (name, *factors[name])))
             elif not name.startswith("\0"):
                 listing.leave_out(name, "holds no plain numbers")
-        clocks = nearest_clocks([((name,), samples) for name in taken])
-        for name, clock in zip(taken, clocks, strict=True):
-            unit = units[name] or ("s" if name.lower() == "time" else "")
-            listing.add(Column(plain(name), unit, samples, clock=clock), (name, *factors[name]))
+        listing.add_timed(found)
         self.columns, self.warnings = listing.columns(), listing.warnings()
         self._places = listing.places
 

@@ -15,7 +15,6 @@ from .listing import (
     Listing,
     first_text,
     matrix_columns,
-    nearest_clocks,
     numbers,
     plain,
 )
@@ -45,17 +44,7 @@ class Hdf5File(Table):
         self._found: list[tuple[tuple[str, ...], Column, Any]] = []
         self._seen = 0
         self._walk(self._file, ())
-        clocks = nearest_clocks([(path, column.samples) for path, column, _ in self._found])
-        for (_, column, place), clock in zip(self._found, clocks, strict=True):
-            taken = Column(
-                column.name,
-                column.unit,
-                column.samples,
-                column.group,
-                clock=clock,
-                comment=column.comment,
-            )
-            self._listing.add(taken, place)
+        self._listing.add_timed(self._found)
         self.columns, self.warnings = self._listing.columns(), self._listing.warnings()
         self._places = self._listing.places
 

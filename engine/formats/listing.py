@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -47,6 +48,16 @@ class Listing:
         self._columns.append(column)
         self.places.append(place)
         return len(self._columns) - 1
+
+    def add_timed(self, found: Iterable[tuple[tuple[str, ...], Column, Any]]) -> None:
+        """Take columns, their time the nearest column of time unless they tell their own steps.
+
+        found : path of groups and name, column, and where its numbers are
+        """
+        found = list(found)
+        clocks = nearest_clocks([(path, column.samples) for path, column, _ in found])
+        for (_, column, place), clock in zip(found, clocks, strict=True):
+            self.add(replace(column, clock=clock if column.step is None else None), place)
 
     def leave_out(self, name: str, why: str) -> None:
         """Note what is not taken for a column, and why."""

@@ -19,7 +19,6 @@ from .listing import (
     Listing,
     first_text,
     matrix_columns,
-    nearest_clocks,
     numbers,
     plain,
 )
@@ -66,10 +65,7 @@ class Mat5File(Table):
         with path.open("rb") as stream:
             for head in heads(stream):
                 self._variable(head)
-        clocks = nearest_clocks([(path, column.samples) for path, column, _ in self._found])
-        for (_, column, place), clock in zip(self._found, clocks, strict=True):
-            taken = Column(column.name, column.unit, column.samples, column.group, clock=clock)
-            self._listing.add(taken, place)
+        self._listing.add_timed(self._found)
         self.columns, self.warnings = self._listing.columns(), self._listing.warnings()
         self._places = self._listing.places
         self._held: tuple[str, Any] = ("", None)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..csv_table import split_title
-from .listing import Listing, first_text, nearest_clocks, numbers, plain
+from .listing import Listing, first_text, numbers, plain
 from .table import Array, Column, Table
 
 
@@ -31,7 +31,7 @@ class ParquetTable(Table):
         )
         samples, listing = int(self._file.metadata.num_rows), Listing(source, kind)
         fields = {field.name: field for field in self._file.schema_arrow}
-        taken: list[tuple[str, str, int]] = []
+        found: list[tuple[tuple[str, ...], Column, int]] = []
         for leaf in range(self._file.metadata.num_columns):
             described = self._file.schema.column(leaf)
             field = fields.get(described.path)
@@ -41,10 +41,9 @@ class ParquetTable(Table):
             name, unit = split_title(plain(field.name))
             stated = field.metadata or {}
             unit = first_text(stated.get(b"unit"), stated.get(b"units"), unit)
-            taken.append((name, "s" if pa.types.is_temporal(field.type) else unit, leaf))
-        clocks = nearest_clocks([((name,), samples) for name, _, _ in taken])
-        for (name, unit, leaf), clock in zip(taken, clocks, strict=True):
-            listing.add(Column(name, unit, samples, clock=clock), leaf)
+            unit = "s" if pa.types.is_temporal(field.type) else unit
+            found.append(((name,), Column(name, unit, samples), leaf))
+        listing.add_timed(found)
         self.columns, self.warnings = listing.columns(), listing.warnings()
         self._leaves = listing.places
 

@@ -8,7 +8,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from .listing import Listing, first_text, nearest_clocks, numbers, plain
+from .listing import Listing, first_text, numbers, plain
 from .table import Array, Column, Table
 
 
@@ -22,7 +22,7 @@ class TdmsTable(Table):
         file = TdmsFile.open(str(path))
         listing, size = Listing(source, kind), path.stat().st_size
         channels = [channel for group in file.groups() for channel in group.channels()]
-        taken = []
+        found = []
         for channel in channels:
             if channel.data_type is None or len(channel) == 0:
                 listing.leave_out(channel.name, "holds no samples")
@@ -31,23 +31,8 @@ class TdmsTable(Table):
             elif len(channel) > size:  # a sample takes a byte at least
                 listing.leave_out(channel.name, "declares more samples than the file holds")
             else:
-                taken.append(channel)
-        clocks = nearest_clocks(
-            [((plain(one.group_name), plain(one.name)), len(one)) for one in taken]
-        )
-        for channel, clock in zip(taken, clocks, strict=True):
-            start, step = _waveform(channel.properties)
-            column = Column(
-                plain(channel.name),
-                _unit(channel),
-                len(channel),
-                plain(channel.group_name),
-                clock=None if step is not None else clock,
-                start=start,
-                step=step,
-                comment=first_text(channel.properties.get("description")),
-            )
-            listing.add(column, channel)
+                found.append((_path(channel), _column(channel), channel))
+        listing.add_timed(found)
         self.columns, self.warnings = listing.columns(), listing.warnings()
         self._channels = listing.places
 
@@ -58,6 +43,19 @@ class TdmsTable(Table):
     def part(self, index: int, begin: int, count: int) -> Array:
         """Some scaled values of one channel."""
         return numbers(self._channels[index].read_data(offset=begin, length=count, scaled=True))
+
+
+def _path(channel: Any) -> tuple[str, str]:
+    return plain(channel.group_name), plain(channel.name)
+
+
+def _column(channel: Any) -> Column:
+    group, name = _path(channel)
+    start, step = _waveform(channel.properties)
+    comment = first_text(channel.properties.get("description"))
+    return Column(
+        name, _unit(channel), len(channel), group, start=start, step=step, comment=comment
+    )
 
 
 def _waveform(properties: Any) -> tuple[float, float | None]:
