@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compared_runs import ComparedRun
-from .fit import Estimate, FittedRun, Minimum, SensorEstimate
+from .fit import CombinationEstimate, Estimate, FittedRun, Minimum, SensorEstimate
 from .problem import Problem
 from .simulation import fit_percent
 from .spikes import despiked
@@ -264,10 +264,15 @@ def bound_findings(estimates: Sequence[Estimate]) -> list[str]:
     return [_at_bound(one) for one in estimates if one.at_bound]
 
 
-def undetermined_findings(estimates: Sequence[Estimate], errors: Uncertainty) -> list[str]:
+def undetermined_findings(
+    estimates: Sequence[Estimate],
+    errors: Uncertainty,
+    combinations: Sequence[CombinationEstimate] = (),
+) -> list[str]:
     """What the runs do not determine, grouped by what can be done about it.
 
     errors : of all estimates, in their order
+    combinations : those that the verdict tells of; a pair in one of them is not told again
     """
     unexcited, confused, unknown, sensors = [], [], [], []
     for k, one in enumerate(estimates):
@@ -286,11 +291,12 @@ def undetermined_findings(estimates: Sequence[Estimate], errors: Uncertainty) ->
         found.append(
             f"The runs do not excite {', '.join(unexcited)}; {remedy} or add a run that does."
         )
-    for first, second in confused:
-        found.append(
-            f"The runs hardly tell {estimates[first].title} from {estimates[second].title}; fix "
-            "one of them or add a run that moves them differently."
-        )
+    for first, second in ((estimates[one], estimates[other]) for one, other in confused):
+        if not any({first.name, second.name} <= {*one.of} for one in combinations):
+            found.append(
+                f"The runs hardly tell {first.title} from {second.title}; fix one of them or add a "
+                "run that moves them differently."
+            )
     if unknown:
         found.append(
             f"The runs leave {', '.join(unknown)} with a 95 % interval wider than half the value; "

@@ -163,13 +163,13 @@ def identify(
             *whiteness_findings(tests),
             *bound_findings([*parameters, *sensors]),
         ]
+    vehicle, judged = problem.vehicle_at(solution.x), without_verdict(parameters)
     if converged:
-        warnings += undetermined_findings([*parameters, *sensors], of_all)
+        judged = verdict(parameters, errors, vehicle)
+        warnings += undetermined_findings([*parameters, *sensors], of_all, judged.combinations)
     return Fit(
-        verdict=verdict(parameters, errors, problem.vehicle_at(solution.x))
-        if converged
-        else without_verdict(parameters),
-        vehicle=problem.vehicle_at(solution.x),
+        verdict=judged,
+        vehicle=vehicle,
         parameters=parameters,
         sensors=sensors,
         fixed_sensors=problem.sensors.fixed,

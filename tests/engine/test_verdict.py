@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from ridetune.engine.combinations import COMBINATIONS
 from ridetune.engine.fit import ParameterEstimate
+from ridetune.engine.fit_findings import undetermined_findings
 from ridetune.engine.parameters import default_bounds
 from ridetune.engine.uncertainty import Uncertainty
 from ridetune.engine.verdict import by_class, verdict, without_verdict
@@ -16,18 +17,21 @@ NAMES = (BAR, DISTANCE)
 NAMED = {one.name: one for one in COMBINATIONS}
 
 
+def estimated(words=("weakly", "weakly"), names=NAMES, at_bound=False):
+    return [
+        ParameterEstimate(name, CAR.value(name), "", 0.0, (0, 0), 1.0, *bounds, at_bound, word)
+        for name, word in zip(names, words, strict=True)
+        for bounds in [default_bounds(name, 1.0)]
+    ]
+
+
 def judged(covariance, unknown=(), words=("weakly", "weakly"), names=NAMES, at_bound=False):
     """The verdict on parameters with some covariance of their logarithms."""
     n = len(names)
     errors = Uncertainty(
         np.array(covariance), np.array(unknown).reshape(-1, n), quantile=2.0, alone=np.zeros(n)
     )
-    estimates = [
-        ParameterEstimate(name, CAR.value(name), "", 0.0, (0, 0), 1.0, *bounds, at_bound, word)
-        for name, word in zip(names, words, strict=True)
-        for bounds in [default_bounds(name, 1.0)]
-    ]
-    return verdict(estimates, errors, CAR)
+    return verdict(estimated(words, names, at_bound), errors, CAR)
 
 
 def along(*directions):
@@ -48,6 +52,18 @@ def test_a_bar_is_known_by_its_rate_at_the_wheels_where_its_stiffness_is_not():
     assert rate.determined == "yes"
     [sentence] = [one for one in found.sentences if "bar's rate" in one]
     assert sentence.startswith("Ktor_F and d_F are determined only together, as Ktor_F/d_F^2")
+
+
+def test_a_pair_is_told_once():
+    """Its combination says what the runs know of it; a warning stands where there is none."""
+    covariance = along((0.5, (2, 1)), (1e-4 / 5, (1, -2)))
+    errors = Uncertainty(covariance, np.empty((0, 2)), quantile=2.0, alone=np.zeros(2))
+    estimates = estimated(("no", "no"))
+    [warning] = undetermined_findings(estimates, errors)
+    assert f"hardly tell {BAR} from {DISTANCE}" in warning
+    combinations = verdict(estimates, errors, CAR).combinations
+    assert "front.bar_rate" in [one.name for one in combinations]
+    assert undetermined_findings(estimates, errors, combinations) == []
 
 
 def test_a_direction_that_no_run_moves_leaves_the_rate_known():
