@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import RideError
+from .short_file import read_short
 
 _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 
@@ -16,11 +17,7 @@ LARGEST_FILE = 5_000_000
 
 def read_json(path: Path, error: type[RideError]) -> Any:
     """Parse a JSON file; whatever is wrong with it is raised as `error`, naming the file."""
-    try:
-        with path.open("rb") as stream:
-            data = stream.read(LARGEST_FILE + 1)
-    except OSError as cause:
-        raise error(f"{path}: cannot be read ({cause.strerror}); check the path.") from cause
+    data = read_short(path, LARGEST_FILE, error)
     return parse_json(data, path.name, error)
 
 

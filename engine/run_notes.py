@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from .channels import Run, channel, find_channel
 from .errors import MeasurementError
+from .short_file import read_short
 from .step_record import StepRecord, step_record_to_json, step_records_from_json
 from .toml_text import LARGEST_FILE, parse_toml, toml_table, toml_value
 
@@ -65,14 +66,7 @@ def manoeuvre_beside(recording: Path) -> Path:
 
 def read_notes(path: Path) -> RunNotes:
     """The notes in a file, checked; every message starts with the file's name."""
-    try:
-        with path.open("rb") as stream:
-            data = stream.read(LARGEST_FILE + 1)
-    except OSError as error:
-        raise MeasurementError(
-            f"{path}: cannot be read ({error.strerror}); check the path."
-        ) from error
-    return parse_notes(data, path.name)
+    return parse_notes(read_short(path, LARGEST_FILE, MeasurementError), path.name)
 
 
 def parse_notes(data: bytes, source: str) -> RunNotes:

@@ -30,6 +30,7 @@ from .frames import AXLES, CORNERS
 from .json_record import RecordReader, describe
 from .json_text import parse_json
 from .sensors import RATE, RECORDED, Sensor, SensorSet
+from .short_file import read_short
 from .toml_text import LARGEST_FILE, parse_toml
 from .units import UnitError
 from .vehicle import Range
@@ -61,13 +62,7 @@ def noisy(noise: Mapping[str, float], source: str) -> SensorSet:
 
 def read_sensors(path: Path) -> SensorSet:
     """The set in a TOML or JSON file; every message starts with the file's name."""
-    try:
-        with path.open("rb") as stream:
-            data = stream.read(LARGEST_FILE + 1)
-    except OSError as error:
-        raise MeasurementError(
-            f"{path}: cannot be read ({error.strerror}); check the path."
-        ) from error
+    data = read_short(path, LARGEST_FILE, MeasurementError)
     return sensors_from_json(content_of(data, path.name), path.name)
 
 
