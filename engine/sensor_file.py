@@ -24,7 +24,7 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from .channels import channel
+from .channels import RAW_CHANNELS, channel
 from .errors import MeasurementError
 from .frames import AXLES, CORNERS
 from .json_record import RecordReader, describe
@@ -154,6 +154,11 @@ def _not_offered(name: str, car: str) -> str:
     point, dot, axis = name.rpartition(".")
     if axis.startswith("a_") and point.partition(".")[0] in ("seat", "point") and dot:
         return f"is at a point that is not known; add points.{point} = [x, y, z] in metres."
+    if name in RAW_CHANNELS:
+        return (
+            "is what raw instruments record, and no simulated car has it; name what conditioning"
+            f" makes of it, such as {', '.join(RECORDED[:4])}, or an accelerometer at a point."
+        )
     return f"is nothing that the {car} car on a road has; leave it out."
 
 

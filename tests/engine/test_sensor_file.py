@@ -103,6 +103,8 @@ def test_noise_alone_is_a_set_of_the_usual_sensors():
         ({"sensors": {"chassis.z": {"unit": "deg"}}}, "sensors.chassis.z.unit cannot be: "),
         ({"sensors": {"chassis.z": {"unit": "mn"}}}, "sensors.chassis.z.unit cannot be: "),
         ({"sensors": {"chassis.z": {"resolution": -1}}}, "resolution is -1, but must lie between"),
+        ({"sensors": {"chassis.body_a_z": {}}}, "chassis.body_a_z is what raw instruments record"),
+        ({"sensors": {"wheel.fl.a_z": {}}}, "or an accelerometer at a point"),
         ({"sensors": {"post.fl.z": {}}}, "post.fl.z is nothing that the concept car on a road has"),
         ({"sensors": {"seat.rear.a_z": {}}}, "add points.seat.rear = [x, y, z] in metres"),
         ({"points": {"boot": [0, 0, 0]}}, 'points.boot must be called "seat.NAME" or "point.NAME"'),
