@@ -24,10 +24,17 @@ from .arguments import braking
 
 Known = TypeVar("Known")
 
+ELSEWHERE = {
+    ".csv": "CSV recordings go with --rims or to identify, posts with --posts, roads with --road",
+    ".toml": "notes in TOML lie beside their recording, sensors go with --sensors of campaign",
+}
+"""By the end of its name, where a file belongs that is taken for a vehicle or a manoeuvre."""
+
 
 def find_vehicle(name: str) -> Vehicle:
     """The vehicle in a vehicle or fit file, or a reference vehicle by its key."""
     if _is_file(name):
+        _require_json(name, VehicleError, "vehicle")
         return read_vehicle(name)
     return _known(name, reference_vehicles(), VehicleError, "vehicle")
 
@@ -35,8 +42,15 @@ def find_vehicle(name: str) -> Vehicle:
 def find_manoeuvre(name: str) -> Manoeuvre:
     """The manoeuvre in a file, or a reference manoeuvre by its key."""
     if _is_file(name):
+        _require_json(name, ManoeuvreError, "manoeuvre")
         return read_manoeuvre(name)
     return _known(name, reference_manoeuvres(), ManoeuvreError, "manoeuvre")
+
+
+def _require_json(name: str, kind: type[RideError], noun: str) -> None:
+    """Say where a file belongs that, by the end of its name, is none of ours in JSON."""
+    if place := ELSEWHERE.get(Path(name).suffix.lower()):
+        raise kind(f"{name}: a {noun} is a JSON file; {place}.")
 
 
 def _is_file(name: str) -> bool:
