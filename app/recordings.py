@@ -21,12 +21,16 @@ from ..engine.run_notes import doubtful_noise
 from .store import Measurement, NewMeasurement, Store
 
 if TYPE_CHECKING:
+    from ..engine.formats.child import Bounds
     from ..engine.formats.table import Table
     from ..engine.mapping.survey import Survey
     from ..engine.recorded_motion import RecordedMotion
 
 REMEMBERED_VALUES = 8_000_000
 """Numbers kept in memory over all runs, and as many over all motions: 64 MB."""
+
+ANSWER = 3.0
+"""Times its processor time that a process which reads a file has for an answer."""
 
 REMEMBERED_COLUMNS = 20_000
 """Columns of surveys kept in memory, some kB each."""
@@ -71,7 +75,7 @@ class Recordings:
         run = self._runs.get(key)
         if run is None:
             data = self._store.original(measurement).read_bytes()
-            run = parse(data, measurement.name, mapping=measurement.mapping)
+            run = self.parse(data, measurement.name, mapping=measurement.mapping)
             self._runs.keep(key, run, len(run.time) * (1 + len(run.columns)))
         return replace(
             run,
@@ -107,7 +111,8 @@ class Recordings:
         key = measurement.sha256, measurement.name
         found = self._surveys.get(key)
         if found is None:
-            found = survey(self._store.original(measurement).read_bytes(), measurement.name)
+            data = self._store.original(measurement).read_bytes()
+            found = self._surveyed(data, measurement.name)
             self._surveys.keep(key, found, len(found.columns))
         return found
 
@@ -116,8 +121,72 @@ class Recordings:
         """The file as a table, for as long as the `with` lasts."""
         from ..engine.formats.opening import opened
 
-        with opened(self._store.original(measurement), measurement.name, apart=True) as table:
+        path, name = self._store.original(measurement), measurement.name
+        with opened(path, name, apart=True, bounds=self._bounds) as table:
             yield table
+
+    def parse(
+        self,
+        data: bytes,
+        name: str,
+        noise: Mapping[str, float] | None = None,
+        mapping: Mapping[str, Any] | None = None,
+    ) -> Run:
+        """Read a measurement file; MeasurementError says what is wrong with it and where.
+
+        noise : standard deviations in SI by channel, which are stated beside the file
+        mapping : as JSON, which columns are which channels; None for those with our names
+        """
+        from ..engine.measurement import parse_run
+
+        try:
+            if mapping is None:
+                return parse_run(data, name, noise=noise, apart=True, bounds=self._bounds)
+            # The mapping brings scipy.
+            from ..engine.mapping.mapping import mapping_from_json
+            from ..engine.mapping.reading import parse_recording
+
+            known = mapping_from_json(mapping)
+            return parse_recording(data, name, known, noise=noise, bounds=self._bounds)
+        except (RecursionError, MemoryError, OverflowError) as error:
+            raise MeasurementError(
+                f"{name}: the file is too large or too deep to read ({type(error).__name__}); "
+                "send a plain CSV."
+            ) from None
+        except OSError as error:
+            raise MeasurementError(
+                f"{name}: there is no room to read the file ({error.strerror}); try again later."
+            ) from error
+
+    def recorded(
+        self, data: bytes, name: str, noise: Mapping[str, float] | None = None
+    ) -> NewMeasurement:
+        """A measurement file as it is kept; arguments and errors as of `parse`.
+
+        One with names of its own is kept as a file that needs a mapping.
+        """
+        try:
+            run = self.parse(data, name, noise)
+        except UnmappedError as error:
+            found = unmapped_summary(self._surveyed(data, name), error)
+            return NewMeasurement(name, data, found, noise or {})
+        return NewMeasurement(name, data, summary(run), dict(run.noise))
+
+    def _surveyed(self, data: bytes, name: str) -> "Survey":
+        from ..engine.formats.opening import opened_bytes
+        from ..engine.mapping.survey import survey
+
+        with opened_bytes(data, name, apart=True, bounds=self._bounds) as table:
+            return survey(table)
+
+    @property
+    def _bounds(self) -> "Bounds":
+        """What the process that reads a file may take."""
+        from ..engine.formats.child import Bounds
+
+        limits = self._store.limits
+        seconds = limits.reader_seconds
+        return Bounds(memory=limits.reader_bytes, cpu=seconds, wall=ANSWER * seconds)
 
 
 def _key(measurement: Measurement) -> tuple[str, str]:
@@ -154,59 +223,6 @@ def as_stated(measurement: Measurement, kept: Mapping[str, Any]) -> Measurement:
         mapping=kept.get("mapping"),
         conditioning=kept.get("conditioning"),
     )
-
-
-def parse(
-    data: bytes,
-    name: str,
-    noise: Mapping[str, float] | None = None,
-    mapping: Mapping[str, Any] | None = None,
-) -> Run:
-    """Read a measurement file; MeasurementError says what is wrong with it and where.
-
-    noise : standard deviations in SI by channel, which are stated beside the file
-    mapping : as JSON, which columns are which channels; None for those with our names
-    """
-    from ..engine.measurement import parse_run
-
-    try:
-        if mapping is None:
-            return parse_run(data, name, noise=noise, apart=True)
-        # The mapping brings scipy.
-        from ..engine.mapping.mapping import mapping_from_json
-        from ..engine.mapping.reading import parse_recording
-
-        return parse_recording(data, name, mapping_from_json(mapping), noise=noise)
-    except (RecursionError, MemoryError, OverflowError) as error:
-        raise MeasurementError(
-            f"{name}: the file is too large or too deep to read ({type(error).__name__}); "
-            "send a plain CSV."
-        ) from None
-    except OSError as error:
-        raise MeasurementError(
-            f"{name}: there is no room to read the file ({error.strerror}); try again later."
-        ) from error
-
-
-def recorded(data: bytes, name: str, noise: Mapping[str, float] | None = None) -> NewMeasurement:
-    """A measurement file as it is kept; arguments and errors as of `parse`.
-
-    One with names of its own is kept as a file that needs a mapping.
-    """
-    try:
-        run = parse(data, name, noise)
-    except UnmappedError as error:
-        return NewMeasurement(name, data, unmapped_summary(survey(data, name), error), noise or {})
-    return NewMeasurement(name, data, summary(run), dict(run.noise))
-
-
-def survey(data: bytes, name: str) -> "Survey":
-    """What is in the bytes of a file that a stranger sent."""
-    from ..engine.formats.opening import opened_bytes
-    from ..engine.mapping.survey import survey as of_table
-
-    with opened_bytes(data, name, apart=True) as table:
-        return of_table(table)
 
 
 def with_braking(run: Run, intervals: Iterable[tuple[float, float]] | None) -> Run:

@@ -17,7 +17,6 @@ from .errors import Conflict, NotFound
 from .job_routes import View, job_router, submitted
 from .job_store import Job
 from .jobs import as_asked
-from .recordings import recorded
 from .routes_measurements import measurement_to_json
 from .schemas import CampaignRequest
 from .services import Services, Shared
@@ -118,7 +117,9 @@ def _recorded(services: Services, job: Job, recording: Mapping[str, Any]) -> New
     """A whole recording with the noise that its notes state, and what was driven."""
     name = f"{recording['name']}.toml"
     noise = parse_notes(_read(services, job, name), name).noise
-    new = recorded(_read(services, job, recording["file"]), recording["file"], noise)
+    new = services.recordings.recorded(
+        _read(services, job, recording["file"]), recording["file"], noise
+    )
     driven = json.loads(_read(services, job, f"{recording['name']}.manoeuvre.json"))
     return replace(new, manoeuvre=driven)
 

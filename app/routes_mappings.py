@@ -10,7 +10,7 @@ from starlette.concurrency import run_in_threadpool
 
 from .access import SessionId
 from .columns import columns_to_json, preview
-from .recordings import parse, recorded, summary
+from .recordings import summary
 from .routes_measurements import measurement_to_json
 from .schemas import JsonObject, NamedMapping
 from .services import Services, Shared
@@ -79,7 +79,7 @@ def _map(services: Services, sid: str, kept: Measurement, body: JsonObject) -> M
 
     mapping = mapping_to_json(mapping_from_json(body, "mapping"))
     data = services.store.original(kept).read_bytes()
-    noise = dict(parse(data, kept.name, kept.noise, mapping).noise)
+    noise = dict(services.recordings.parse(data, kept.name, kept.noise, mapping).noise)
     done = services.recordings.run(replace(kept, mapping=mapping, noise=noise, summary={}))
     found = summary(done, mapping)
     return services.store.set_mapping(sid, kept.id, mapping, noise, found)
@@ -93,7 +93,7 @@ async def forget_mapping(sid: SessionId, mid: str, services: Shared) -> dict[str
 
     def by_names() -> Measurement:
         data = services.store.original(kept).read_bytes()
-        found = recorded(data, kept.name, kept.noise)
+        found = services.recordings.recorded(data, kept.name, kept.noise)
         bare = replace(kept, mapping=None, noise=found.noise, summary=found.summary)
         unmapped = found.summary["needs_mapping"]
         known = found.summary if unmapped else summary(services.recordings.run(bare))

@@ -14,7 +14,7 @@ from ..engine.json_text import parse_json
 from ..engine.run_notes import parse_notes
 from . import frames
 from .access import SessionId
-from .recordings import parse, recorded, summary
+from .recordings import summary
 from .routes_simulations import FORMS, csv_reply, frames_reply
 from .services import Services, Shared
 from .store import Measurement
@@ -59,7 +59,7 @@ async def upload(sid: SessionId, services: Shared, received: Recording) -> dict[
 
 def _keep(services: Services, sid: str, received: Upload) -> Measurement:
     data = received.read(services.settings.limits.upload_bytes)
-    return services.store.add_measurement(sid, recorded(data, received.name))
+    return services.store.add_measurement(sid, services.recordings.recorded(data, received.name))
 
 
 @router.get("")
@@ -132,7 +132,7 @@ def _note(services: Services, sid: str, kept: Measurement, received: Upload) -> 
     if kept.summary.get("needs_mapping"):
         return services.store.set_noise(sid, kept.id, noise, kept.summary)
     data = services.store.original(kept).read_bytes()
-    known = dict(parse(data, kept.name, noise, kept.mapping).noise)
+    known = dict(services.recordings.parse(data, kept.name, noise, kept.mapping).noise)
     found = summary(services.recordings.run(replace(kept, noise=known)), kept.mapping)
     return services.store.set_noise(sid, kept.id, known, found)
 

@@ -27,6 +27,8 @@ class Limits:
 
     upload_bytes: int = 100_000_000
     body_bytes: int = 4_000_000
+    reader_bytes: int = 2 << 30
+    reader_seconds: int = 20
     sessions: int = 1000
     session_measurements: int = 50
     session_bytes: int = 500_000_000

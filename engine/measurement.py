@@ -27,6 +27,7 @@ from .channels import (
 from .clocks import clocks_of, on_one_clock
 from .csv_table import is_number, split_title
 from .errors import MeasurementError, UnmappedError
+from .formats.child import BOUNDS, Bounds
 from .formats.kinds import CSV
 from .formats.opening import opened, opened_bytes
 from .formats.table import Table
@@ -80,13 +81,19 @@ def read_run(path: str | Path, *, noise: Mapping[str, float] | None = None) -> R
 
 
 def parse_run(
-    data: bytes, name: str, *, noise: Mapping[str, float] | None = None, apart: bool = False
+    data: bytes,
+    name: str,
+    *,
+    noise: Mapping[str, float] | None = None,
+    apart: bool = False,
+    bounds: Bounds = BOUNDS,
 ) -> Run:
     """Read the bytes of a measurement file; `name` is the run's name and heads every message.
 
     apart : whether a child reads text, too, as for what strangers send
+    bounds : what the child may take
     """
-    with opened_bytes(data, name, apart=apart) as table:
+    with opened_bytes(data, name, apart=apart, bounds=bounds) as table:
         return _run(table, noise or {}, "")
 
 

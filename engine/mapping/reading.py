@@ -5,6 +5,7 @@ from pathlib import Path
 
 from ..channels import Run
 from ..errors import MeasurementError
+from ..formats.child import BOUNDS, Bounds
 from ..formats.opening import opened, opened_bytes
 from ..formats.table import Table
 from ..measurement import read_run
@@ -34,10 +35,15 @@ def read_recording(
 
 
 def parse_recording(
-    data: bytes, name: str, mapping: ChannelMapping, *, noise: Mapping[str, float] | None = None
+    data: bytes,
+    name: str,
+    mapping: ChannelMapping,
+    *,
+    noise: Mapping[str, float] | None = None,
+    bounds: Bounds = BOUNDS,
 ) -> Run:
     """Read the bytes of a file that a stranger sent under a mapping; see `parse_run`."""
-    with opened_bytes(data, name, apart=True) as table:
+    with opened_bytes(data, name, apart=True, bounds=bounds) as table:
         return _mapped(table, mapping, noise or {}, "")
 
 

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -326,3 +327,14 @@ def test_a_sample_run_uploads_like_any_other_file(visitor):
     file = SAMPLES / "detailed/manoeuvre_1.csv"
     kept = visitor.upload(file.read_bytes(), file.name).json()
     assert kept["sha256"] in {one["sha256"] for one in visitor.get("/measurements").json()[:-1]}
+
+
+def test_the_reader_of_a_file_has_the_memory_that_the_service_is_told(small_limits):
+    """Oracle: a recording that is taken otherwise, and a process that cannot even start."""
+    limits = replace(small_limits.limits, reader_bytes=1000)
+    with open_client(small_limits) as client:
+        assert Visitor(client).upload(short_recording()).status_code == 201
+    with open_client(replace(small_limits, limits=limits)) as client:
+        reply = Visitor(client).upload(short_recording())
+    assert reply.status_code == 422, reply.text
+    assert "run.csv: its reader" in reply.json()["detail"]
