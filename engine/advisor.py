@@ -33,7 +33,6 @@ from .candidates import Drive, catalogue, drives
 from .errors import ProblemError
 from .expected_noise import INPUT_NOISE, ExpectedNoise, noise_of_runs, stated_noise
 from .fit import determined
-from .identification import AT_BOUND
 from .integration import cores
 from .manoeuvre import Manoeuvre
 from .new_run import of_all_runs, said_by
@@ -296,15 +295,10 @@ def _knowledge(free: Sequence[FreeParameter], errors: Uncertainty) -> tuple[Know
                 value,
                 abs(one.slope(variable)) * deviation,
                 interval,
-                determined(value, 0.5 * (interval[1] - interval[0]), _at_bound(one)),
+                determined(value, 0.5 * (interval[1] - interval[0]), one.at_bound(value)),
             )
         )
     return tuple(found)
-
-
-def _at_bound(one: FreeParameter) -> bool:
-    nearest = min(one.start - one.lower, one.upper - one.start)
-    return nearest < AT_BOUND * (one.upper - one.lower)
 
 
 def _bits(free: Sequence[FreeParameter], errors: Uncertainty) -> float:

@@ -214,8 +214,7 @@ def _variables(free: Sequence[FreeParameter], vehicle: Vehicle) -> Array:
 
 
 def _bounds(free: Sequence[FreeParameter]) -> tuple[Array, Array]:
-    ends = [sorted((one.variable(one.lower), one.variable(one.upper))) for one in free]
-    lower, upper = np.array(ends).T
+    lower, upper = np.array([one.ends for one in free]).T
     return lower, upper
 
 

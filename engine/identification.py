@@ -53,7 +53,6 @@ from .search_settings import MOST_STARTS
 from .sensor_findings import estimated, offers
 from .simulation import rims_batch
 from .uncertainty import Uncertainty, information, uncertainty
-from .variables import Variable
 from .verdict import verdict, without_verdict
 from .whiteness import whiteness, whiteness_findings
 
@@ -68,10 +67,6 @@ MOST_EVALUATIONS = 100
 EVALUATIONS_ON_A_FAULT = 40
 """Trial points spent when a channel probably has the wrong sign or unit: enough should it turn out
 to be right, no more because a fit to the wrong one means nothing."""
-
-AT_BOUND = 1e-3
-"""A value nearer to a bound than this share of the range between the bounds is at it."""
-
 
 SCATTERED_STARTS = 32
 """Cars tried around start values that do not carry the car through the runs; if all fail, as many
@@ -292,9 +287,9 @@ def _estimates(
         zip(problem.variables, x.tolist(), beyond.tolist(), errors.std_error.tolist(), strict=True)
     ):
         value = one.value(variable)
-        at_bound = _at_bound(one, value)
+        at_bound = one.at_bound(value)
         below = above = errors.quantile * deviation
-        if at_bound and variable < 0.5 * sum(map(one.variable, (one.lower, one.upper))):
+        if at_bound and variable < 0.5 * sum(one.ends):
             below, above = math.inf, max(0.0, further - variable + above)
         elif at_bound:
             below, above = max(0.0, variable - further + below), math.inf
@@ -352,16 +347,10 @@ def _minimum(ended: list[Found], residuals: Residuals) -> Minimum:
         cut_short=sum(one.ending == Ending.SAME_BASIN for one in ended),
         from_start=any(one.told for one in ended),
         at_bound=tuple(
-            one.name
-            for one, value in zip(problem.free, values, strict=True)
-            if _at_bound(one, value)
+            one.name for one, value in zip(problem.free, values, strict=True) if one.at_bound(value)
         ),
         outcome=lowest.ending,
     )
-
-
-def _at_bound(one: Variable, value: float) -> bool:
-    return min(value - one.lower, one.upper - value) < AT_BOUND * (one.upper - one.lower)
 
 
 def _outcome(

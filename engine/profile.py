@@ -40,9 +40,6 @@ MOST_STRIDE = 0.25
 PAST = 1.1
 """Quantiles from the fit at which a side ends."""
 
-AT_BOUND = 1e-3
-"""A profile that comes nearer to a bound than this share of the range ends there."""
-
 POINTS = 16
 """On each side at most."""
 
@@ -115,7 +112,6 @@ def profile(
     above = tour.points(1.0, errors.quantile, told)
     points = [*reversed(below), tour.centre, *above]
     one = problem.free[held]
-    span = (one.upper - one.lower) * AT_BOUND
     return Profile(
         name=known,
         points=tuple(points),
@@ -124,8 +120,8 @@ def profile(
             _end([tour.centre, *below], errors.quantile, -math.inf),
             _end([tour.centre, *above], errors.quantile, math.inf),
         ),
-        lower_at_bound=points[0].value - one.lower < span,
-        upper_at_bound=one.upper - points[-1].value < span,
+        lower_at_bound=one.at_lower(points[0].value),
+        upper_at_bound=one.at_upper(points[-1].value),
         simulations=tour.simulations,
     )
 
@@ -165,7 +161,7 @@ class _Tour:
         others, slope = np.delete(self._best.x, self._held), self._slope
         rising = one.variable(one.upper) > one.variable(one.lower)
         step = (way if rising else -way) * self._stride
-        first, last = sorted((one.variable(one.lower), one.variable(one.upper)))
+        first, last = one.ends
         found: list[ProfilePoint] = []
         while len(found) < POINTS and first < at < last:
             further = min(max(at + step, first), last)

@@ -116,8 +116,7 @@ class Residuals:
     ):
         check_start(problem)
         self.problem = problem
-        ends = [sorted(map(one.variable, (one.lower, one.upper))) for one in problem.variables]
-        self.lower, self.upper = np.array(ends).T
+        self.lower, self.upper = np.array([one.ends for one in problem.variables]).T
         self.simulations = 0
         self._simulate = simulate
         self._cancelled = cancelled

@@ -12,6 +12,10 @@ from .parameters import parameter
 FARTHEST = 1e3
 """Factor from a value to the end of its interval beyond which the end is not worth telling."""
 
+AT_BOUND = 1e-3
+"""A value whose variable is nearer to that of a bound than this share of the range between the
+bounds is at it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Variable:
@@ -46,6 +50,28 @@ class Variable:
         """The number at a variable, kept between the bounds against rounding."""
         ratio = math.copysign(math.exp(variable), self.lower) if self.logarithmic else variable
         return min(max(ratio * self.scale, self.lower), self.upper)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The lower and the upper end of the variable's range."""
+        low, high = sorted((self.variable(self.lower), self.variable(self.upper)))
+        return low, high
+
+    def at_bound(self, value: float) -> bool:
+        """Whether a value is at one of its bounds."""
+        return self._is_at(self.lower, value) or self._is_at(self.upper, value)
+
+    def at_lower(self, value: float) -> bool:
+        """Whether a value is at its lower bound."""
+        return self._is_at(self.lower, value)
+
+    def at_upper(self, value: float) -> bool:
+        """Whether a value is at its upper bound."""
+        return self._is_at(self.upper, value)
+
+    def _is_at(self, bound: float, value: float) -> bool:
+        low, high = self.ends
+        return abs(self.variable(value) - self.variable(bound)) < AT_BOUND * (high - low)
 
     def slope(self, variable: float) -> float:
         """d value / d variable."""

@@ -197,6 +197,18 @@ def test_the_interval_of_a_parameter_near_its_bound_reaches_back_as_without_it()
     assert held.confidence_interval[1] == np.inf
 
 
+def test_a_bound_far_away_by_its_factor_leaves_a_parameter_as_it_is():
+    """Oracle: the fit between bounds that are near. 100 is twenty times the lower bound, and less
+    than a thousandth of the range away from it."""
+    name = "rear.stabilizer_bar.damping"
+    run = stand_in.recording(CAR, seed=4)
+    near = fit([run], free=[name], start={}).parameters[0]
+    wide = fit([run], free=[name], start={}, bounds={name: (5.0, 1e5)}).parameters[0]
+    assert not wide.at_bound
+    assert wide.determined == "yes"
+    assert wide.confidence_interval == pytest.approx(near.confidence_interval, rel=1e-4)
+
+
 def test_trials_that_fail_are_stepped_around():
     """Oracle: the truth, on the edge of a region of cars that fail."""
     name = PARAMETER_NAMES[0]
