@@ -39,8 +39,8 @@ Method = Literal["linear", "sampled"]
 CARS = 64
 """Cars that are drawn unless told."""
 
-FEWEST_CARS = 16
-"""Cars without which percentiles mean nothing."""
+FEWEST_CARS = 39
+"""Cars between whose outermost 95 % lie on the average."""
 
 DRAWS = 100
 """Times that a car is drawn until it lies between the bounds."""
@@ -166,8 +166,7 @@ def _sampled(
             f"Of {cars} cars within the fit's errors {int(sound.sum())} come through, too few for "
             "a band; fit with more runs, or simulate something gentler."
         )
-    tail = 50.0 * (1.0 - CONFIDENCE)
-    lower, upper = np.percentile(found.rows[1:][sound], (tail, 100.0 - tail), axis=0)
+    lower, upper = percentiles(found.rows[1:][sound])
     failed = cars - int(sound.sum())
     warnings = []
     if failed:
@@ -176,6 +175,17 @@ def _sampled(
             "those of the others."
         )
     return _bands(found, lower, upper, warnings)
+
+
+def percentiles(rows: Array) -> Array:
+    """The 2.5th and the 97.5th of cars' curves (cars, values): (2, values).
+
+    The k-th of n sorted values has k / (n + 1) of its distribution below it on the average
+    (Weibull), whatever the distribution is.
+    """
+    tail = 50.0 * (1.0 - CONFIDENCE)
+    found: Array = np.percentile(rows, (tail, 100.0 - tail), axis=0, method="weibull")
+    return found
 
 
 def _failed(rows: Array) -> NDArray[np.bool_]:

@@ -3,7 +3,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.engine.bands import bands, drawn
+from ridetune.engine.bands import FEWEST_CARS, bands, drawn, percentiles
 from ridetune.engine.campaign import drive_table_2
 from ridetune.engine.channels import Run
 from ridetune.engine.errors import ProblemError, SimulationError
@@ -87,6 +87,16 @@ def test_sampled_bands_of_a_linear_model_agree_with_the_linearised():
     assert np.array_equal(sampled.lower["chassis.z"], again.lower["chassis.z"])
 
 
+@pytest.mark.parametrize("cars", [FEWEST_CARS, 64, 256])
+def test_sampled_bands_hold_95_percent_of_a_distribution(cars):
+    """Oracle: of uniform values the share between two ends is their distance. The share between
+    two order statistics, 0.95 (n + 1) ranks apart, has a beta distribution of variance
+    0.95 0.05 / (n + 2); the mean of 4000 within 4 standard errors."""
+    lower, upper = percentiles(np.random.default_rng(cars).random((cars, 4000)))
+    error = np.sqrt(0.95 * 0.05 / (cars + 2) / 4000)
+    assert np.mean(upper - lower) == pytest.approx(0.95, abs=4.0 * error)
+
+
 def test_what_depends_on_an_unknown_direction_has_no_band():
     """The rear angle is unknown: z has no band, pitch, which it does not touch, has one."""
     fit = toy_fit([[4e-4, 0.0], [0.0, 0.0]], [[0.0, 1.0]])
@@ -150,7 +160,7 @@ def test_failed_cars_are_counted_and_too_few_left_refused():
     found = bands(fit, fit.vehicle, LinearToy(fails_above=0.42), method="sampled")
     assert "of 64 cars within the fit's errors do not come through" in found.warnings[0]
     with pytest.raises(SimulationError, match="too few for a band"):
-        bands(fit, fit.vehicle, LinearToy(fails_above=0.4), method="sampled", cars=16)
+        bands(fit, fit.vehicle, LinearToy(fails_above=0.4), method="sampled", cars=39)
     beside = bands(fit, fit.vehicle, LinearToy(fails_above=0.4))
     assert_allclose(half_width(beside, "chassis.pitch"), 0.04, rtol=1e-9)
 
@@ -160,8 +170,8 @@ def test_a_car_outside_the_bounds_of_the_fit_is_refused():
     car = fit.vehicle.with_values({ANGLES[0]: -0.31})
     with pytest.raises(ProblemError, match=r"front.pivot.angle is -0.31 and was fitted between"):
         bands(fit, car, LinearToy())
-    with pytest.raises(ProblemError, match="15 cars are too few"):
-        bands(fit, fit.vehicle, LinearToy(), method="sampled", cars=15)
+    with pytest.raises(ProblemError, match="38 cars are too few"):
+        bands(fit, fit.vehicle, LinearToy(), method="sampled", cars=38)
 
 
 @pytest.fixture(scope="module")
