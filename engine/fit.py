@@ -45,7 +45,7 @@ class Outcome(StrEnum):
     )
     ASTRAY = (
         "The fit ended further from the measurement than the measurement's own mean; check signs "
-        "and units of the channels, the car's known data and the start values."
+        "and units of the channels, the car's known data, any priors and the start values."
     )
     BUDGET_SPENT = (
         "The fit ran out of evaluations before it converged; begin another from its values, or "

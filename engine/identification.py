@@ -73,7 +73,7 @@ SCATTERED_STARTS = 32
 between the bounds."""
 
 MUCH_BETTER = 0.5
-"""Such a car is taken when its cost is below this share of the start's."""
+"""Such a car is taken when the runs' cost of it is below this share of the start's."""
 
 
 def identify(
@@ -207,7 +207,7 @@ def _usable_start(residuals: Residuals, x: Array) -> tuple[Array, list[str]]:
     """
     r = residuals.vector(x)
     failed = bool(np.any(r == FAILED_TRIAL))
-    cost = residuals.cost(x, r)
+    cost = residuals.cost_of_runs(r)
     if cost <= residuals.scatter():
         return x, []
     if not failed and _in_doubt(residuals, x):
@@ -223,7 +223,7 @@ def _usable_start(residuals: Residuals, x: Array) -> tuple[Array, list[str]]:
     ):
         lower, upper = (np.where(of_sensors, x, end) for end in ends)
         trials = [lower + (upper - lower) * share for share in spread]
-        costs = residuals.costs(trials)
+        costs = residuals.costs_of_runs(trials)
         best = int(np.argmin(costs))
         if costs[best] < MUCH_BETTER * cost:
             return trials[best], [
@@ -364,7 +364,7 @@ def _outcome(
         return Outcome.BUDGET_SPENT
     if found.ending == Ending.STUCK:
         return Outcome.STUCK
-    if found.cost > residuals.scatter():
+    if residuals.cost_of_runs(found.residuals) > residuals.scatter():
         return Outcome.ASTRAY
     if any(one.at_bound for one in (*estimates, *sensors)):
         return Outcome.AT_BOUND

@@ -219,17 +219,24 @@ class Residuals:
 
     def costs(self, trials: Sequence[Array]) -> Array:
         """The cost at each of many points, infinite where the car fails."""
+        return self.costs_of_runs(trials) + np.array([self._cost_of_priors(x) for x in trials])
+
+    def costs_of_runs(self, trials: Sequence[Array]) -> Array:
+        """The same without the priors."""
         rows, _ = self._batch(trials)
-        of_priors = [0.5 * float(np.sum(self.prior_rows(x) ** 2)) for x in trials]
-        return np.nan_to_num(self.problem.loss.costs(rows), nan=np.inf) + np.array(of_priors)
+        return np.nan_to_num(self.problem.loss.costs(rows), nan=np.inf)
 
     def cost(self, x: Array, r: Array) -> float:
-        """Half the sum of the residuals' and the priors' squares as the loss counts them; a failed
-        car is no outlier and costs the squares themselves.
-        """
+        """Half the sum of the residuals' squares as the loss counts them, and of the priors'."""
+        return self.cost_of_runs(r) + self._cost_of_priors(x)
+
+    def cost_of_runs(self, r: Array) -> float:
+        """The same without the priors; a failed car is no outlier and costs the squares."""
         failed = np.any(r == FAILED_TRIAL)
-        of_runs = 0.5 * float(r @ r) if failed else float(self.problem.loss.costs(r))
-        return of_runs + 0.5 * float(np.sum(self.prior_rows(x) ** 2))
+        return 0.5 * float(r @ r) if failed else float(self.problem.loss.costs(r))
+
+    def _cost_of_priors(self, x: Array) -> float:
+        return 0.5 * float(np.sum(self.prior_rows(x) ** 2))
 
     def prior_rows(self, x: Array) -> Array:
         """The priors' residuals, (priors,)."""
@@ -265,7 +272,7 @@ class Residuals:
         return found
 
     def scatter(self) -> float:
-        """Cost of a model that stays at each channel's mean."""
+        """The runs' cost of a model that stays at each channel's mean."""
         return sum(
             float(self.problem.loss.costs((block.measured - np.mean(block.measured)) / block.noise))
             for block in self.blocks()

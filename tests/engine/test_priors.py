@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from ridetune.engine.errors import ParameterError, ProblemError
+from ridetune.engine.fit import Outcome
 from ridetune.engine.identification import Problem, identify
 from ridetune.engine.residuals import Residuals
 
@@ -97,6 +98,42 @@ def test_a_prior_determines_what_the_runs_do_not():
     assert found.parameters[0].determined == "yes"
     assert found.priors[0].without is None
     assert found.converged
+
+
+def test_a_prior_far_from_the_start_is_no_reason_to_leave_it():
+    """Oracle: the fit without the prior, whose start carries the car; the prior is right."""
+    start = {SPRING: 0.7 * CAR.value(SPRING)}
+    told = [
+        identify(
+            Problem.build(CAR, [RUN], FREE, start=start, priors=priors), simulate=stand_in.simulate
+        )
+        for priors in ({}, {SPRING: (CAR.value(SPRING), 3.0)})
+    ]
+    assert told[0].warnings == told[1].warnings == ()
+    assert told[1].parameters[0].value == pytest.approx(CAR.value(SPRING), abs=10.0)
+
+
+@pytest.mark.parametrize(("weight", "astray"), [(1.0, False), (1000.0, True)])
+def test_a_fit_is_astray_by_its_runs_not_by_its_priors(weight, astray):
+    """Oracle: the runs' cost, quadratic in ln K, against that of their means. A prior at 5 K that
+    weighs as much as the runs leaves ln K half way, where each has a quarter of what the runs have
+    at 5 K: above what their means have, together, and below it, each. One that weighs much more
+    carries the car away, and the sentence names it."""
+    problem = Problem.build(CAR, [RUN], [SPRING])
+    residuals = Residuals(problem, stand_in.simulate)
+    x = np.array([problem.free[0].variable(CAR.value(SPRING))])
+    at_five = float(residuals.costs([x + np.log(5.0)])[0])
+    assert 0.25 * at_five < residuals.scatter() < 0.5 * at_five < at_five
+    deviation = 5.0 * CAR.value(SPRING) * np.log(5.0) / np.sqrt(2.0 * weight * at_five)
+    priors = {SPRING: (5.0 * CAR.value(SPRING), deviation)}
+    found = identify(Problem.build(CAR, [RUN], [SPRING], priors=priors), simulate=stand_in.simulate)
+    assert (found.outcome == Outcome.ASTRAY) == astray
+    assert "any priors" in Outcome.ASTRAY
+    assert not any("start values do not carry" in sentence for sentence in found.warnings)
+    assert any("The runs alone put" in sentence for sentence in found.warnings)
+    if not astray:
+        middle = np.sqrt(5.0) * CAR.value(SPRING)
+        assert found.parameters[0].value == pytest.approx(middle, rel=0.01)
 
 
 @pytest.mark.parametrize(
