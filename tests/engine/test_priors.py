@@ -78,6 +78,21 @@ def test_what_the_runs_say_without_a_prior_is_the_fit_without_it():
     assert "standard errors from its prior" in told
 
 
+def test_what_the_runs_say_without_a_prior_is_not_held_by_a_bound():
+    """Oracle: the normal equations without it, in which the bound, below the truth, plays no
+    part."""
+    priors = {SPRING: (19500.0, 200.0)}
+    named = {"start": {SPRING: 19000.0}, "bounds": {SPRING: (5000.0, 20000.0)}}
+    problem = Problem.build(CAR, [RUN], [SPRING, PIVOT], priors=priors, **named)
+    found = identify(problem, simulate=stand_in.simulate)
+    x, _ = without(problem)
+    check = found.priors[0]
+    assert found.parameters[0].at_bound
+    assert check.without == pytest.approx(problem.free[0].scale * np.exp(x[0]), rel=1e-6)
+    assert check.without == pytest.approx(CAR.value(SPRING), rel=0.01)
+    assert "The runs alone put front.suspension.stiffness at" in " ".join(found.warnings)
+
+
 def test_a_prior_that_agrees_is_not_told_of():
     _, found = fit({PIVOT: (CAR.value(PIVOT), 0.05)})
     assert abs(found.priors[0].apart) < 3.0
