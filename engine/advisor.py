@@ -295,7 +295,7 @@ def _knowledge(free: Sequence[FreeParameter], errors: Uncertainty) -> tuple[Know
                 value,
                 abs(one.slope(variable)) * deviation,
                 interval,
-                determined(value, 0.5 * (interval[1] - interval[0]), one.at_bound(value)),
+                determined(one.size(value), 0.5 * (interval[1] - interval[0]), one.at_bound(value)),
             )
         )
     return tuple(found)

@@ -12,6 +12,10 @@ from dataclasses import dataclass
 from .frames import AXLES, AxleName
 from .vehicle import Vehicle
 
+MATTERS = 0.05
+"""What an error of a slope, or of a height in m, nearer to 0 is judged by: a pivot's angle of as
+many rad makes such a slope, and at an arm of 1 m such a height."""
+
 
 @dataclass(frozen=True, slots=True)
 class Combination:
@@ -19,6 +23,7 @@ class Combination:
 
     of : names of the parameters that it is made of
     signed : whether it may be negative or zero
+    matters : what its error is judged by at least, in place of |value|
     """
 
     name: str
@@ -28,6 +33,7 @@ class Combination:
     of: tuple[str, ...]
     value: Callable[[Vehicle], float]
     signed: bool = False
+    matters: float = 0.0
 
 
 def _bar(axle: AxleName, number: str, letter: str, name: str, unit: str) -> Combination:
@@ -79,6 +85,7 @@ def _traction_slope(axle: AxleName) -> Combination:
         of=(f"{axle}.pivot.angle", f"{axle}.pivot.distance"),
         value=value,
         signed=True,
+        matters=MATTERS,
     )
 
 
@@ -96,6 +103,7 @@ def _pivot_height(axle: AxleName) -> Combination:
         of=(f"{axle}.pivot.distance", f"{axle}.pivot.angle"),
         value=value,
         signed=True,
+        matters=MATTERS,
     )
 
 

@@ -19,7 +19,8 @@ Array = NDArray[np.float64]
 
 DETERMINED_BELOW = 0.15
 WEAKLY_BELOW = 0.50
-"""Half-width of the 95 % interval over |value| up to which a parameter is determined, or weakly."""
+"""Half-width of the 95 % interval over its size, |value| unless that may be 0, up to which a
+parameter is determined, or weakly."""
 
 DELAY_MATTERS = 0.005
 """What stands for |value| where it is a delay's, s: one sample at the usual rate."""
@@ -76,8 +77,9 @@ class ParameterEstimate:
     std_error : infinite where the runs do not determine the parameter
     confidence_interval : 95 %, an end infinite where the runs leave it open: on both sides of a
         parameter that they do not determine, beyond a bound at which the search ended
-    determined : "yes" (95 % half-width under 15 % of |value|), "weakly" (under 50 %) or "no"
-        (wider, or at a bound, or when the fit did not converge to the runs)
+    determined : "yes" (95 % half-width under 15 % of |value|, of an angle of at least
+        ANGLE_MATTERS), "weakly" (under 50 %) or "no" (wider, or at a bound, or when the fit did not
+        converge to the runs)
     """
 
     name: str
@@ -330,8 +332,8 @@ class Fit:
     verdict: Verdict
 
 
-def determined(value: float, half_width: float, at_bound: bool = False) -> str:
-    """ "yes", "weakly" or "no"."""
-    if at_bound or not half_width < WEAKLY_BELOW * abs(value):
+def determined(size: float, half_width: float, at_bound: bool = False) -> str:
+    """ "yes", "weakly" or "no" of a half-width judged by a size."""
+    if at_bound or not half_width < WEAKLY_BELOW * size:
         return "no"
-    return "yes" if half_width < DETERMINED_BELOW * abs(value) else "weakly"
+    return "yes" if half_width < DETERMINED_BELOW * size else "weakly"

@@ -310,7 +310,7 @@ def _estimates(
                 lower=one.lower,
                 upper=one.upper,
                 at_bound=at_bound,
-                determined=determined(value, 0.5 * (interval[1] - interval[0]), at_bound),
+                determined=determined(one.size(value), 0.5 * (interval[1] - interval[0]), at_bound),
             )
         )
     return tuple(parameters), tuple(sensors)

@@ -9,6 +9,9 @@ from dataclasses import dataclass
 
 from .parameters import parameter
 
+ANGLE_MATTERS = 0.05
+"""What an error of a pivot's angle nearer to 0 is judged by, rad: 3 degrees."""
+
 FARTHEST = 1e3
 """Factor from a value to the end of its interval beyond which the end is not worth telling."""
 
@@ -77,6 +80,10 @@ class Variable:
         """d value / d variable."""
         return self.value(variable) if self.logarithmic else self.scale
 
+    def size(self, value: float) -> float:
+        """What the error of a value is judged by: |value|."""
+        return abs(value)
+
     def interval(self, variable: float, below: float, above: float) -> tuple[float, float]:
         """Values from so far below a variable to so far above it, bounds aside. An end is infinite
         where it is, or where the logarithm puts it a factor FARTHEST or more away.
@@ -101,3 +108,8 @@ class FreeParameter(Variable):
     def unit(self) -> str:
         """SI unit of the parameter."""
         return parameter(self.name).unit
+
+    def size(self, value: float) -> float:
+        """|value|, and of a pivot's angle, which may be 0, at least ANGLE_MATTERS."""
+        angle = self.name.endswith("pivot.angle")
+        return max(abs(value), ANGLE_MATTERS) if angle else abs(value)

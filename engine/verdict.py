@@ -142,7 +142,7 @@ def _estimate(
         value=value,
         std_error=error,
         confidence_interval=interval,
-        determined=determined(value, 0.5 * (interval[1] - interval[0])),
+        determined=determined(max(abs(value), one.matters), 0.5 * (interval[1] - interval[0])),
     )
 
 
@@ -194,10 +194,13 @@ def _of_parameters(classes: Mapping[str, Sequence[str]]) -> list[str]:
 def _of_combination(one: CombinationEstimate, known: Sequence[str]) -> str:
     apart = [parameter(name).symbol for name in one.of if name not in known]
     low, high = one.confidence_interval
-    half_width = 0.5 * (high - low) / abs(one.value)
+    half_width, unit = 0.5 * (high - low), after_number(one.unit)
+    if low < 0.0 < high:
+        told = f"{one.value:.4g} ± {half_width:.2g}{unit}"
+    else:
+        told = f"{one.value:.4g}{unit} to {in_percent(half_width / abs(one.value))}"
     are = "are determined only together" if len(apart) > 1 else "is determined better"
     return (
         f"{', '.join(apart[:-1])}{' and ' if apart[1:] else ''}{apart[-1]} {are}, as {one.symbol},"
-        f" the {one.label[0].lower()}{one.label[1:]}: {one.value:.4g}{after_number(one.unit)}"
-        f" to {in_percent(half_width)}."
+        f" the {one.label[0].lower()}{one.label[1:]}: {told}."
     )

@@ -16,18 +16,20 @@ NAMES = (BAR, DISTANCE)
 NAMED = {one.name: one for one in COMBINATIONS}
 
 
-def judged(covariance, unknown=(), words=("weakly", "weakly"), names=NAMES, at_bound=False):
+def judged(
+    covariance, unknown=(), words=("weakly", "weakly"), names=NAMES, at_bound=False, car=CAR
+):
     """The verdict on parameters with some covariance of their logarithms."""
     n = len(names)
     errors = Uncertainty(
         np.array(covariance), np.array(unknown).reshape(-1, n), quantile=2.0, alone=np.zeros(n)
     )
     estimates = [
-        ParameterEstimate(name, CAR.value(name), "", 0.0, (0, 0), 1.0, *bounds, at_bound, word)
+        ParameterEstimate(name, car.value(name), "", 0.0, (0, 0), 1.0, *bounds, at_bound, word)
         for name, word in zip(names, words, strict=True)
         for bounds in [default_bounds(name, 1.0)]
     ]
-    return verdict(estimates, errors, CAR)
+    return verdict(estimates, errors, car)
 
 
 def along(*directions):
@@ -95,6 +97,21 @@ def test_the_traction_slope_s_error_is_absolute():
     assert slope.value == pytest.approx(math.tan(pivot.angle) - radius / pivot.distance)
     low, high = slope.confidence_interval
     assert (low, high) == pytest.approx((slope.value - 2e-3, slope.value + 2e-3))
+
+
+def test_a_traction_slope_of_0_is_determined_as_one_of_0_05():
+    """Oracle: tan phi = r/d, so the slope is 0; its error as above, +-0.002 of 0.05: 4 %."""
+    pivot, radius = CAR.front.pivot, CAR.front.wheel.radius
+    car = CAR.with_values({ANGLE: math.atan(radius / pivot.distance)})
+    gradient = np.array([radius / pivot.distance, 1.0 + (radius / pivot.distance) ** 2])
+    across = np.array([gradient[1], -gradient[0]])
+    covariance = along((0.05, across), (1e-6 / (gradient @ gradient), gradient))
+    found = judged(covariance, names=(DISTANCE, ANGLE), car=car)
+    slope = next(one for one in found.combinations if one.name == "front.traction_slope")
+    assert slope.value == pytest.approx(0.0, abs=1e-12)
+    assert slope.determined == "yes"
+    [sentence] = [one for one in found.sentences if "slope" in one]
+    assert sentence.endswith("± 0.002.")
 
 
 def test_a_bar_that_is_turned_by_opposite_wheels_stiffens_each():
