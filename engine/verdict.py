@@ -111,8 +111,9 @@ def _held_together(
     vehicle: Vehicle,
 ) -> CombinationEstimate | None:
     """The combination, if the runs hold it better than what it is made of."""
-    members = [k for k, of in enumerate(estimates) if of.name in one.of]
-    if not np.any(gradient):
+    # A parameter may have no part in it here, as the arm of a bar without a rate.
+    members = [k for k, slope in enumerate(gradient.tolist()) if slope]
+    if not members:
         return None
     estimate = _estimate(one, gradient, errors, vehicle)
     apart = float(np.linalg.norm(gradient[members] * errors.std_error[members]))

@@ -1,4 +1,5 @@
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -6,6 +7,7 @@ from ridetune.engine.combinations import COMBINATIONS
 from ridetune.engine.fit import ParameterEstimate
 from ridetune.engine.parameters import default_bounds
 from ridetune.engine.uncertainty import Uncertainty
+from ridetune.engine.variables import FreeParameter
 from ridetune.engine.verdict import by_class, verdict, without_verdict
 
 from ..factories import paper_vehicle
@@ -64,6 +66,36 @@ def test_a_direction_that_no_run_moves_leaves_the_rate_known():
     assert dict(first.parts) == pytest.approx({BAR: 2 / math.sqrt(5), DISTANCE: 1 / math.sqrt(5)})
     assert second.half_width == pytest.approx(2.0 * math.sqrt(1e-4 / 5))
     assert second.combination == "front.bar_rate"
+
+
+def test_a_parameter_without_a_part_in_a_combination_leaves_it_told():
+    """Oracle: without a bar's rate its arm d, which no run moves, has no part in K + 2 Ktor/d^2,
+    whose logarithm moves by 1 with ln K and by 2 s/(d^2 K) with Ktor/s, s the scale."""
+    spring = "front.suspension.stiffness"
+    car = CAR.with_values({BAR: 0.0})
+    bar = FreeParameter(BAR, 0.0, 0.0, 2e5)
+    slope = 2.0 * bar.scale / (car.value(DISTANCE) ** 2 * car.value(spring))
+    gradient, across = np.array([1.0, slope, 0.0]), np.array([slope, -1.0, 0.0])
+    errors = Uncertainty(
+        along((0.05, across), (1e-4 / (gradient @ gradient), gradient)),
+        np.array([[0.0, 0.0, 1.0]]),
+        quantile=2.0,
+        alone=np.zeros(3),
+    )
+    estimates = [
+        ParameterEstimate(name, car.value(name), "", 0.0, (0, 0), start, *bounds, False, "no")
+        for name, start, bounds in (
+            (spring, 24e3, (1e3, 1e5)),
+            (BAR, 0.0, (0.0, 2e5)),
+            (DISTANCE, 1.6, (0.1, 10.0)),
+        )
+    ]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = verdict(estimates, errors, car)
+    [rate] = [one for one in found.combinations if one.name == "front.wheel_rate_in_roll"]
+    assert rate.value == car.value(spring)
+    assert rate.std_error == pytest.approx(0.01 * rate.value, rel=1e-6)
 
 
 def test_a_parameter_at_its_bound_may_be_known_together_with_another():
