@@ -181,7 +181,7 @@ def advise_unmeasured(
     )
     problem = Problem(vehicle, (), parameters, "exact", settings)
     nothing = np.zeros((len(parameters), len(parameters)))
-    known = Information(nothing, nothing, 0.0, 0.0)
+    known = Information(nothing, (), 0.0, ())
     expected = stated_noise(vehicle, settings, noise, step=SAMPLE_STEP)
     return _advised(problem, known, expected, candidates or catalogue(), planned, began)
 

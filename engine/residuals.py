@@ -176,9 +176,9 @@ class Residuals:
         return [
             Information(
                 root=triangle(row[np.newaxis]),
-                scatter=np.outer(row, row),
+                scatters=(np.outer(row, row),),
                 samples=1.0,
-                freedom=0.0,
+                freedoms=(np.inf,),
             )
             for row in self.prior_slopes()
         ]

@@ -265,7 +265,7 @@ def test_marginal_information_gives_the_marginal_errors():
     """Oracle: the errors of all five variables, of which the first two are taken."""
     rng = np.random.default_rng(0)
     slopes, scores = rng.normal(size=(40, 5)), rng.normal(size=(40, 5))
-    whole = Information(triangle(slopes), scores.T @ scores, 40.0, 30.0)
+    whole = Information(triangle(slopes), (scores.T @ scores,), 40.0, (30.0,))
     of_two = whole.marginal([0, 1])
     part, errors = uncertainty(of_two), uncertainty(whole).marginal(2)
     assert_allclose(part.covariance, errors.covariance, rtol=1e-10)
@@ -278,8 +278,8 @@ def test_a_variable_without_effect_takes_nothing_from_the_others():
     rng = np.random.default_rng(0)
     slopes, scores = rng.normal(size=(40, 3)), rng.normal(size=(40, 3))
     slopes[:, 2] = scores[:, 2] = 0.0
-    whole = Information(triangle(slopes), scores.T @ scores, 40.0, 30.0)
-    known = Information(triangle(slopes[:, :2]), scores[:, :2].T @ scores[:, :2], 40.0, 30.0)
+    whole = Information(triangle(slopes), (scores.T @ scores,), 40.0, (30.0,))
+    known = Information(triangle(slopes[:, :2]), (scores[:, :2].T @ scores[:, :2],), 40.0, (30.0,))
     found = uncertainty(whole.marginal([0, 1]))
     assert_allclose(found.covariance, uncertainty(known).covariance, rtol=1e-10)
     assert len(found.unknown) == 0
