@@ -5,7 +5,8 @@ The rise D(p) = 2 (cost(p) - cost at the fit) is turned into a distance in stand
 
     t(p)^2 = D(p) (s_0 / s)^2,
 
-with s_0 the error by the cost's second derivative alone, s_0^2 = (J^T J)^-1, and s that of
+with s_0 the error by the cost's second derivative alone, s_0^2 = (J^T J)^-1 (with a loss, J as in
+`Residuals.of_runs`: what keeps w above 0 for the search would not be that of D), and s that of
 `uncertainty`, which knows how correlated the residuals are (Pace & Salvan, Principles of
 Statistical Inference, 1997, 4.7: the scaled likelihood ratio of a wrong likelihood). The 95 %
 interval is where t stays below the quantile. Where the fit is as good as linear it is that of the
@@ -98,22 +99,24 @@ def profile(
     Raises ProblemError for a parameter that is not free, ParameterError for a name that is none,
     and Cancelled.
     """
-    known = parameter(name).name
-    require_free(problem, [known])
-    held = [one.name for one in problem.free].index(known)
+    full = parameter(name).name
+    require_free(problem, [full])
+    held = [one.name for one in problem.free].index(full)
     residuals = Residuals(problem, simulate, cancelled)
     start = [one.variable(one.start) for one in problem.variables]
     best = Search(residuals).refine(_off_bounds(start, residuals), EVALUATIONS)
     said = information(residuals.of_runs(best.residuals, best.slopes))
-    errors = uncertainty(sum(residuals.of_priors(), start=said))
-    tour = _Tour(problem, held, best, float(errors.std_error[held]), residuals)
+    known = sum(residuals.of_priors(), start=said)
+    errors = uncertainty(known)
+    curvature = known.root.T @ known.root
+    tour = _Tour(problem, held, best, curvature, float(errors.std_error[held]), residuals)
     told = progress or (lambda points: None)
     below = tour.points(-1.0, errors.quantile, told)
     above = tour.points(1.0, errors.quantile, told)
     points = [*reversed(below), tour.centre, *above]
     one = problem.free[held]
     return Profile(
-        name=known,
+        name=full,
         points=tuple(points),
         quantile=errors.quantile,
         confidence_interval=(
@@ -138,11 +141,17 @@ class _Tour:
     """The way along one parameter, away from the best fit to either side."""
 
     def __init__(
-        self, problem: Problem, held: int, best: Found, error: float, residuals: Residuals
+        self,
+        problem: Problem,
+        held: int,
+        best: Found,
+        curvature: Array,
+        error: float,
+        residuals: Residuals,
     ):
         self._problem, self._held, self._best, self._all = problem, held, best, residuals
         self.simulations = residuals.simulations
-        inverse = np.linalg.pinv(best.curvature, rcond=DIRECTION_TOLERANCE**2, hermitian=True)
+        inverse = np.linalg.pinv(curvature, rcond=DIRECTION_TOLERANCE**2, hermitian=True)
         blind = math.sqrt(float(inverse[held, held]))
         known = math.isfinite(error) and error > 0.0
         self._ratio = blind / error if known else 1.0

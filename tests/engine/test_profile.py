@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from ridetune.engine.errors import Cancelled, ParameterError, ProblemError
 from ridetune.engine.identification import Problem, identify
+from ridetune.engine.loss import Loss
 from ridetune.engine.parameters import PARAMETER_NAMES
 from ridetune.engine.profile import profile
 
@@ -27,6 +28,10 @@ def fitted(simulate=stand_in.simulate, runs=None, **named):
     return fit, Problem.build(CAR, runs, **{**named, "start": start, "bounds": bounds})
 
 
+def interval_of(fit, name):
+    return next(one.confidence_interval for one in fit.parameters if one.name == name)
+
+
 @pytest.mark.parametrize("name", [SPRING, ANGLE])
 def test_where_the_model_is_linear_a_profile_is_the_fit_s_interval(name):
     """Oracle: a quadratic cost, so t is the change of the variable over its standard error. What
@@ -43,6 +48,20 @@ def test_where_the_model_is_linear_a_profile_is_the_fit_s_interval(name):
     assert found.points[0].distance < -found.quantile < found.quantile < found.points[-1].distance
     assert not found.lower_at_bound
     assert not found.upper_at_bound
+
+
+@pytest.mark.parametrize("loss", [Loss("cauchy", 1.0), Loss("arctan", 1.5), Loss("huber", 1.0)])
+def test_a_profile_by_a_loss_is_as_wide_as_the_fit_s_interval(loss):
+    """Oracle: the fit's interval, as the summed cost is a quadratic over so small steps. The fit
+    takes the second derivative by a channel's mean w, the cost has that of each sample; their
+    means over 1000 samples, half of them deep in the bend, differ by sqrt(0.5) / sqrt(1000) = 2 %,
+    their roots by 1 %; twice that."""
+    runs = [stand_in.recording(CAR, seed=4)]
+    named = {"free": [SPRING, "rear.pivot.angle"], "loss": loss}
+    fit, problem = fitted(runs=runs, **named)
+    found = profile(problem, SPRING, simulate=stand_in.simulate)
+    widths = [high - low for low, high in (found.confidence_interval, interval_of(fit, SPRING))]
+    assert widths[0] == pytest.approx(widths[1], rel=0.02)
 
 
 def test_the_others_follow_along_a_valley():
