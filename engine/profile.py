@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from .errors import ProblemError
 from .parameters import parameter
-from .problem import Problem
+from .problem import FreeParameter, Problem
 from .residuals import Residuals, Simulate
 from .search import Found, Search
 from .simulation import rims_batch
@@ -36,7 +36,8 @@ STRIDE = 0.5
 """Between two points, in standard errors; where the error is unknown or large ..."""
 
 MOST_STRIDE = 0.25
-"""... at most so much of the search's variable, where 1 is about 100 %."""
+"""... at most so much of the search's variable, where 1 is about 100 %; more where a side's points
+would reach neither its bound nor the quantile."""
 
 PAST = 1.1
 """Quantiles from the fit at which a side ends."""
@@ -120,8 +121,8 @@ def profile(
         points=tuple(points),
         quantile=errors.quantile,
         confidence_interval=(
-            _end([tour.centre, *below], errors.quantile, -math.inf),
-            _end([tour.centre, *above], errors.quantile, math.inf),
+            _end(one, [tour.centre, *below], errors.quantile, -math.inf),
+            _end(one, [tour.centre, *above], errors.quantile, math.inf),
         ),
         lower_at_bound=one.at_lower(points[0].value),
         upper_at_bound=one.at_upper(points[-1].value),
@@ -169,11 +170,11 @@ class _Tour:
         at = float(self._best.x[self._held])
         others, slope = np.delete(self._best.x, self._held), self._slope
         rising = one.variable(one.upper) > one.variable(one.lower)
-        step = (way if rising else -way) * self._stride
+        ahead, stride, before = (way if rising else -way), self._stride, 0.0
         first, last = one.ends
         found: list[ProfilePoint] = []
         while len(found) < POINTS and first < at < last:
-            further = min(max(at + step, first), last)
+            further = min(max(at + ahead * stride, first), last)
             moved, cost = self._refitted(further, others + slope * (further - at))
             rise = max(2.0 * (cost - self._best.cost), 0.0)
             distance = way * math.sqrt(rise) * self._ratio
@@ -183,6 +184,11 @@ class _Tour:
             at, others = further, moved
             if abs(distance) > PAST * quantile:
                 break
+            left, rate = POINTS - len(found), abs(distance - before)
+            if left and abs(distance) + left * rate < PAST * quantile:
+                room = last - at if ahead > 0.0 else at - first
+                stride = max(stride, room / left)
+            before = distance
         return found
 
     def _refitted(self, at: float, others: Array) -> tuple[Array, float]:
@@ -217,10 +223,13 @@ def _off_bounds(x: Sequence[float] | Array, residuals: Residuals) -> Array:
     return np.clip(x, residuals.lower + room, residuals.upper - room)
 
 
-def _end(points: Sequence[ProfilePoint], quantile: float, otherwise: float) -> float:
+def _end(
+    one: FreeParameter, points: Sequence[ProfilePoint], quantile: float, otherwise: float
+) -> float:
     """The value at which t reaches the quantile, between the points, from the fit outwards."""
     for near, far in pairwise(points):
         if abs(far.distance) >= quantile:
             share = (quantile - abs(near.distance)) / (abs(far.distance) - abs(near.distance))
-            return near.value + share * (far.value - near.value)
+            begin, end = one.variable(near.value), one.variable(far.value)
+            return one.value(begin + share * (end - begin))
     return otherwise

@@ -87,6 +87,43 @@ def test_the_others_follow_along_a_valley():
     assert found.upper_at_bound
 
 
+def test_a_profile_goes_on_to_where_a_parameter_ends_that_the_runs_hardly_hold():
+    """Oracle: the stand-in, linear in the logarithm, on which the spring acts 4000 times less:
+    the interval is the fit's, whose ends are a factor of more than e^4 from the value, where
+    sixteen quarters of 100 % end, and nearer than the bounds."""
+
+    def simulate(cars, inputs, traction):
+        values = stand_in.values_of(cars)
+        weakly = CAR.value(SPRING) * (values[SPRING] / CAR.value(SPRING)) ** 2.3e-4
+        return stand_in.histories(values | {SPRING: weakly}, inputs)
+
+    bounds = {SPRING: (100.0, 1e7)}
+    runs = [stand_in.recording(CAR, seed=8)]
+    fit, problem = fitted(simulate, runs, free=[SPRING], bounds=bounds)
+    low, high = interval_of(fit, SPRING)
+    value = fit.parameters[0].value
+    assert bounds[SPRING][0] < low < math.exp(-4.0) * value
+    assert math.exp(4.0) * value < high < bounds[SPRING][1]
+    found = profile(problem, SPRING, simulate=simulate)
+    assert np.log(found.confidence_interval) == pytest.approx(np.log([low, high]), abs=0.02)
+
+
+def test_a_profile_of_what_the_runs_do_not_hold_at_all_goes_to_its_bounds():
+    """Oracle: the bounds, factors of 240 and 420 away."""
+
+    def simulate(cars, inputs, traction):
+        values = stand_in.values_of(cars)
+        hardly = CAR.value(SPRING) * (values[SPRING] / CAR.value(SPRING)) ** 1e-5
+        return stand_in.histories(values | {SPRING: hardly}, inputs)
+
+    bounds = {SPRING: (100.0, 1e7)}
+    _, problem = fitted(simulate, free=[SPRING], bounds=bounds)
+    found = profile(problem, SPRING, simulate=simulate)
+    assert found.confidence_interval == (-math.inf, math.inf)
+    assert found.lower_at_bound
+    assert found.upper_at_bound
+
+
 def test_a_bound_ends_a_profile_and_leaves_its_side_open():
     """Oracle: the bound lies one error above the fit, where t is 1."""
     fit, _ = fitted()
