@@ -413,6 +413,16 @@ def test_what_a_sensor_cannot_be_is_refused_in_one_sentence(sensors, sentence):
     assert sentence in str(refused.value)
 
 
+def test_a_bias_is_not_found_of_a_channel_in_whose_measured_state_the_model_begins(true):
+    settings = RimsSettings(initial_state="measured")
+    fitted = {"chassis.pitch": {"bias": "fit"}}
+    with pytest.raises(ProblemError) as refused:
+        Problem.build(CAR, [true], FOUR, settings=settings, sensors=fitted)
+    assert str(refused.value).startswith("The bias of chassis.pitch is to be fitted, but")
+    assert "begin in equilibrium, or state the bias" in str(refused.value)
+    Problem.build(CAR, [true], FOUR, settings=settings, sensors={"chassis.a_x": {"bias": "fit"}})
+
+
 def test_a_bias_behind_a_high_pass_and_a_noise_stated_twice_are_refused():
     run = stand_in.recording(stand_in.REFERENCE, samples=4001)
     settings = RimsSettings(output_highpass_hz=0.5)
