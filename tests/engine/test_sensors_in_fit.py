@@ -423,6 +423,25 @@ def test_a_bias_is_not_found_of_a_channel_in_whose_measured_state_the_model_begi
     Problem.build(CAR, [true], FOUR, settings=settings, sensors={"chassis.a_x": {"bias": "fit"}})
 
 
+@pytest.mark.parametrize(
+    ("found", "told"),
+    [
+        ((), "chassis.z reads 20 instead of 0 mm, chassis.pitch reads 1 instead of 0 deg;"),
+        (("chassis.z",), "there chassis.pitch reads 1 instead of 0 deg;"),
+        (("chassis.z", "chassis.pitch"), None),
+        (("wheel.fl.z",), None),
+    ],
+)
+def test_a_rest_value_that_is_to_be_found_is_not_to_be_subtracted(true, found, told):
+    off = {"chassis.z": 0.02, "chassis.pitch": np.radians(1.0)}
+    run = replace(true, channels={k: v + off.get(k, 0.0) for k, v in true.channels.items()})
+    sensors = {name: {"bias": "fit"} for name in found}
+    [seen] = Problem.build(CAR, [run], FOUR, sensors=sensors).runs
+    rests = [one for one in seen.inputs.warnings if "starts at rest" in one]
+    assert len(rests) == (told is not None)
+    assert told is None or told in rests[0]
+
+
 def test_a_bias_behind_a_high_pass_and_a_noise_stated_twice_are_refused():
     run = stand_in.recording(stand_in.REFERENCE, samples=4001)
     settings = RimsSettings(output_highpass_hz=0.5)
