@@ -24,6 +24,7 @@ class Combination:
     of : names of the parameters that it is made of
     signed : whether it may be negative or zero
     matters : what its error is judged by at least, in place of |value|
+    acts : whether it is what acts in a car
     """
 
     name: str
@@ -34,6 +35,7 @@ class Combination:
     value: Callable[[Vehicle], float]
     signed: bool = False
     matters: float = 0.0
+    acts: Callable[[Vehicle], bool] = lambda car: True
 
 
 def _bar(axle: AxleName, number: str, letter: str, name: str, unit: str) -> Combination:
@@ -76,6 +78,12 @@ def _traction_slope(axle: AxleName) -> Combination:
         one = car.axle(axle)
         return math.tan(one.pivot.angle) - one.wheel.radius / one.pivot.distance
 
+    def acts(car: Vehicle) -> bool:
+        """A torque held inside the arm, as of a hub motor, leaves the slope at tan phi."""
+        one = car.axle(axle)
+        braked = car.brakes is not None and car.brakes.reaction == "chassis"
+        return braked or (one.driven and one.torque_reaction == "chassis")
+
     letter = axle[0].upper()
     return Combination(
         name=f"{axle}.traction_slope",
@@ -86,6 +94,7 @@ def _traction_slope(axle: AxleName) -> Combination:
         value=value,
         signed=True,
         matters=MATTERS,
+        acts=acts,
     )
 
 

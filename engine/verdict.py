@@ -54,7 +54,7 @@ def verdict(
     gradients = {
         one.name: _gradient(one, estimates, vehicle)
         for one in COMBINATIONS
-        if sum(name in names for name in one.of) > 1
+        if one.acts(vehicle) and sum(name in names for name in one.of) > 1
     }
     combined = [
         estimate

@@ -1,5 +1,6 @@
 import math
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from ridetune.engine.fit import ParameterEstimate
 from ridetune.engine.parameters import default_bounds
 from ridetune.engine.uncertainty import Uncertainty
 from ridetune.engine.variables import FreeParameter
+from ridetune.engine.vehicle import Brakes
 from ridetune.engine.verdict import by_class, verdict, without_verdict
 
 from ..factories import paper_vehicle
@@ -15,6 +17,7 @@ from ..factories import paper_vehicle
 CAR = paper_vehicle()
 BAR, DISTANCE, ANGLE = "front.stabilizer_bar.stiffness", "front.pivot.distance", "front.pivot.angle"
 NAMES = (BAR, DISTANCE)
+REAR = ("rear.pivot.distance", "rear.pivot.angle")
 NAMED = {one.name: one for one in COMBINATIONS}
 
 
@@ -117,14 +120,14 @@ def test_well_known_parameters_need_no_combination():
 
 def test_the_traction_slope_s_error_is_absolute():
     """Oracle: d(tan phi - r/d) = s / cos^2 phi dx + r/d dln(d), x = phi/s with s the start, 1."""
-    pivot, radius = CAR.front.pivot, CAR.front.wheel.radius
+    pivot, radius = CAR.rear.pivot, CAR.rear.wheel.radius
     gradient = np.array(
         [radius / pivot.distance, 1.0 / math.cos(pivot.angle) ** 2],
     )
     across = np.array([gradient[1], -gradient[0]])
     covariance = along((0.05, across), (1e-6 / (gradient @ gradient), gradient))
-    found = judged(covariance, names=(DISTANCE, ANGLE))
-    slope = next(one for one in found.combinations if one.name == "front.traction_slope")
+    found = judged(covariance, names=REAR)
+    slope = next(one for one in found.combinations if one.name == "rear.traction_slope")
     assert slope.std_error == pytest.approx(1e-3, rel=1e-6)
     assert slope.value == pytest.approx(math.tan(pivot.angle) - radius / pivot.distance)
     low, high = slope.confidence_interval
@@ -133,17 +136,38 @@ def test_the_traction_slope_s_error_is_absolute():
 
 def test_a_traction_slope_of_0_is_determined_as_one_of_0_05():
     """Oracle: tan phi = r/d, so the slope is 0; its error as above, +-0.002 of 0.05: 4 %."""
-    pivot, radius = CAR.front.pivot, CAR.front.wheel.radius
-    car = CAR.with_values({ANGLE: math.atan(radius / pivot.distance)})
+    pivot, radius = CAR.rear.pivot, CAR.rear.wheel.radius
+    car = CAR.with_values({REAR[1]: math.atan(radius / pivot.distance)})
     gradient = np.array([radius / pivot.distance, 1.0 + (radius / pivot.distance) ** 2])
     across = np.array([gradient[1], -gradient[0]])
     covariance = along((0.05, across), (1e-6 / (gradient @ gradient), gradient))
-    found = judged(covariance, names=(DISTANCE, ANGLE), car=car)
-    slope = next(one for one in found.combinations if one.name == "front.traction_slope")
+    found = judged(covariance, names=REAR, car=car)
+    slope = next(one for one in found.combinations if one.name == "rear.traction_slope")
     assert slope.value == pytest.approx(0.0, abs=1e-12)
     assert slope.determined == "yes"
     [sentence] = [one for one in found.sentences if "slope" in one]
     assert sentence.endswith("± 0.002.")
+
+
+@pytest.mark.parametrize(
+    ("driven", "reaction", "braked", "told"),
+    [
+        (True, "chassis", "arm", True),
+        (True, "arm", "arm", False),
+        (False, "chassis", "arm", False),
+        (False, "chassis", "chassis", True),
+    ],
+)
+def test_a_traction_slope_is_told_where_the_chassis_holds_a_torque(driven, reaction, braked, told):
+    """Oracle: moments about the pivot. A force at the ground whose torque the arm holds lifts by
+    tan phi alone; the chassis's torque turns the arm by r times the force more."""
+    axle = replace(CAR.rear, driven=driven, torque_reaction=reaction)
+    car = replace(CAR, rear=axle, brakes=Brakes(0.65, braked))
+    pivot, radius = CAR.rear.pivot, CAR.rear.wheel.radius
+    gradient = np.array([radius / pivot.distance, 1.0 / math.cos(pivot.angle) ** 2])
+    covariance = along((0.05, (gradient[1], -gradient[0])), (1e-6, gradient))
+    found = judged(covariance, names=REAR, car=car)
+    assert ("rear.traction_slope" in [one.name for one in found.combinations]) == told
 
 
 def test_a_bar_that_is_turned_by_opposite_wheels_stiffens_each():
