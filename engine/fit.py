@@ -164,10 +164,10 @@ class CombinationEstimate:
 
 @dataclass(frozen=True, slots=True)
 class Direction:
-    """A way for the parameters to move together, an axis of their joint 95 % region.
+    """A way for the parameters to move together, an axis of their covariance.
 
-    half_width : how far they may go, in the search's variables, where 1 is about 100 %; infinite
-        where the runs do not determine it
+    half_width : of the 95 % interval of how far they go, in the search's variables, where 1 is
+        about 100 %; infinite where the runs do not determine it
     parts : by parameter, the larger components of the unit direction, the largest first
     combination : name of the one that moves along it and hardly otherwise, if there is one
     """
@@ -183,7 +183,7 @@ class Verdict:
 
     parameters : by "yes", "weakly" and "no", their names
     combinations : that the runs determine better than their parameters
-    directions : axes of the joint region, the least determined first
+    directions : axes of the covariance, the least determined first
     sentences : the same for a person
     """
 
@@ -215,7 +215,8 @@ class Whiteness:
 
     statistic : greatest distance of the cumulative periodogram from that of white noise, 0 to 1
     p : probability of such a distance or a greater one, were they white
-    rms : of the residuals, in units of the noise
+    rms : of the residuals, in units of the noise; with a loss, of what stands for them in the
+        errors (`Residuals.of_runs`)
     effective_samples : independent samples that they are worth, of `samples`
     """
 

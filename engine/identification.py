@@ -89,7 +89,7 @@ def identify(
     """Fit the problem's free parameters.
 
     progress : called after every evaluation
-    cancelled : polled throughout; Cancelled is raised within a tenth of a second of its being true
+    cancelled : polled throughout; Cancelled is raised within 0.2 s of its being true
     most_evaluations : trial points before a search gives up
     starts : points to try as starts, the told one and others spread over the bounds by `seed`
     simulate : the model, as a function of cars, inputs and traction
