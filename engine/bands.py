@@ -30,7 +30,7 @@ from .metrics import metrics
 from .parameters import parameter
 from .problem import FreeParameter
 from .simulation import Model
-from .uncertainty import CONFIDENCE, PART_OF_DIRECTION, Uncertainty
+from .uncertainty import CONFIDENCE, NAMED, PART_OF_DIRECTION, Uncertainty
 from .vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -47,9 +47,6 @@ DRAWS = 100
 
 STEP = 1e-4
 """Of the differences of x: their error is of its square, that of rounding 1e-12 over it."""
-
-NAMED = 0.2
-"""Component of a unit direction from which a parameter is named with it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -60,9 +60,6 @@ __all__ = ["Fit", "FreeParameter", "Outcome", "Problem", "Progress", "identify"]
 
 Array = NDArray[np.float64]
 
-OFF_BOUNDS = 1e-3
-"""The search begins at least this share of the range away from a bound."""
-
 MOST_EVALUATIONS = 100
 EVALUATIONS_ON_A_FAULT = 40
 """Trial points spent when a channel probably has the wrong sign or unit: enough should it turn out
@@ -101,13 +98,8 @@ def identify(
         raise ProblemError(f"starts is {starts}; give a number from 1 to {MOST_STARTS}.")
     began = time.perf_counter()
     residuals = Residuals(problem, simulate, cancelled)
-    # A start on a bound leaves the trust region no room and the search ends where it began.
-    room = OFF_BOUNDS * (residuals.upper - residuals.lower)
-    x_start = np.clip(
-        [one.variable(one.start) for one in problem.variables],
-        residuals.lower + room,
-        residuals.upper - room,
-    )
+    lower, upper = residuals.starts_between
+    x_start = np.clip([one.variable(one.start) for one in problem.variables], lower, upper)
     x_start, moved = _usable_start(residuals, x_start)
     start = residuals.model(x_start)
 
@@ -115,7 +107,6 @@ def identify(
     doubted = _in_doubt(residuals, x_start)
     if doubted:  # where other starts would mean nothing either
         most_evaluations, starts = min(most_evaluations, EVALUATIONS_ON_A_FAULT), 1
-    lower, upper = residuals.lower + room, residuals.upper - room
     others = spread(problem.of_car(lower), problem.of_car(upper), starts - 1, seed)
     of_sensors = x_start[len(problem.free) :]
     others = [np.concatenate([of_car, of_sensors]) for of_car in others]

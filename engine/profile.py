@@ -48,9 +48,6 @@ POINTS = 16
 EVALUATIONS = 40
 """For each point at most."""
 
-OFF_BOUNDS = 1e-3
-"""The others begin at least this share of their range away from their bounds."""
-
 
 @dataclass(frozen=True, slots=True)
 class ProfilePoint:
@@ -105,7 +102,7 @@ def profile(
     held = [one.name for one in problem.free].index(full)
     residuals = Residuals(problem, simulate, cancelled)
     start = [one.variable(one.start) for one in problem.variables]
-    best = Search(residuals).refine(_off_bounds(start, residuals), EVALUATIONS)
+    best = Search(residuals).refine(np.clip(start, *residuals.starts_between), EVALUATIONS)
     said = information(residuals.of_runs(best.residuals, best.slopes))
     known = sum(residuals.of_priors(), start=said)
     errors = uncertainty(known)
@@ -205,7 +202,8 @@ class _Tour:
                 priors=tuple(each for each in problem.priors if each.name != one.name),
             )
         )
-        found = Search(residuals).refine(_off_bounds(others, residuals), EVALUATIONS)
+        start = np.clip(others, *residuals.starts_between)
+        found = Search(residuals).refine(start, EVALUATIONS)
         self.simulations += residuals.simulations
         of_it = [each.residual(one, at) for each in problem.priors if each.name == one.name]
         return found.x, found.cost + 0.5 * sum(residual**2 for residual in of_it)
@@ -216,11 +214,6 @@ class _Tour:
         of_car = others[: len(rest)]
         values = {each.name: each.value(float(x)) for each, x in zip(rest, of_car, strict=True)}
         return ProfilePoint(one.value(at), distance, cost, values)
-
-
-def _off_bounds(x: Sequence[float] | Array, residuals: Residuals) -> Array:
-    room = OFF_BOUNDS * (residuals.upper - residuals.lower)
-    return np.clip(x, residuals.lower + room, residuals.upper - room)
 
 
 def _end(

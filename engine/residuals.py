@@ -55,6 +55,10 @@ Histories = Mapping[str, Array]
 DIFFERENCE = 1e-4
 """Step h of the differences of x."""
 
+OFF_BOUNDS = 1e-3
+"""A search begins at least this share of the range away from a bound: a start on it leaves the
+trust region no room, and the search ends where it began."""
+
 QUICK_DIFFERENCE = 1e-6
 """Step of the differences of first order of x, whose error is of order h + 1e-13 / h."""
 
@@ -128,6 +132,12 @@ class Residuals:
         self._simulated = [*range(len(problem.free)), *self._driving]
         places = {one.name: place for place, one in enumerate(problem.free)}
         self._priors = [(one, places[one.name]) for one in problem.priors]
+
+    @property
+    def starts_between(self) -> tuple[Array, Array]:
+        """Between what a search may begin, each (n,)."""
+        room = OFF_BOUNDS * (self.upper - self.lower)
+        return self.lower + room, self.upper - room
 
     def of(self, problem: Problem) -> "Residuals":
         """Those of another problem with the same model, under the same watch."""

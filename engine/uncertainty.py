@@ -68,6 +68,9 @@ thousandth of one sample's noise, over the whole campaign."""
 PART_OF_DIRECTION = 1e-3
 """Component of a unit direction from which a parameter counts as part of it."""
 
+NAMED = 0.2
+"""Component of a unit direction from which a parameter is named with it."""
+
 BODY_MEMORY = 1.0
 """Lags over which residuals may always be correlated, s: a period of the body on its springs."""
 

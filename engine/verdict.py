@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from .combinations import COMBINATIONS, Combination
 from .fit import CombinationEstimate, Direction, ParameterEstimate, Verdict, determined
 from .parameters import parameter
-from .uncertainty import Uncertainty
+from .uncertainty import NAMED, Uncertainty
 from .units import after_number, in_percent
 from .variables import FARTHEST
 from .vehicle import Vehicle
@@ -32,9 +32,6 @@ PART_OF_APART = 1.0 / 3.0
 
 STEP = 1e-4
 """Of the central differences that make g; their error is of order STEP^2."""
-
-LOUD = 0.2
-"""Component of a unit direction from which a parameter is named with it."""
 
 ALONG = 0.95
 """Cosine of the angle between an axis and the gradient of a combination that it stands for."""
@@ -165,7 +162,7 @@ def _parts(names: Sequence[str], axis: Array) -> dict[str, float]:
     """The loud components, the loudest first and positive."""
     order: list[int] = np.argsort(-np.abs(axis)).tolist()
     sign = float(np.sign(axis[order[0]]))
-    return {names[k]: sign * float(axis[k]) for k in order if abs(float(axis[k])) >= LOUD}
+    return {names[k]: sign * float(axis[k]) for k in order if abs(float(axis[k])) >= NAMED}
 
 
 def _along(axis: Array, gradients: Mapping[str, Array]) -> str | None:
