@@ -136,7 +136,7 @@ class BandsForm(WireForm):
 
     identification: Name
     method: Literal["linear", "sampled"] = "linear"
-    cars: Annotated[Whole, Field(ge=16, le=256)] = 64
+    cars: Annotated[Whole, Field(ge=39, le=256)] = 64
     seed: Seed = 0
 
 

@@ -181,7 +181,7 @@ def advise_unmeasured(
     )
     problem = Problem(vehicle, (), parameters, "exact", settings)
     nothing = np.zeros((len(parameters), len(parameters)))
-    known = Information(nothing, nothing, 0.0, 0.0)
+    known = Information(nothing, (), 0.0, ())
     expected = stated_noise(vehicle, settings, noise, step=SAMPLE_STEP)
     return _advised(problem, known, expected, candidates or catalogue(), planned, began)
 
@@ -295,7 +295,7 @@ def _knowledge(free: Sequence[FreeParameter], errors: Uncertainty) -> tuple[Know
                 value,
                 abs(one.slope(variable)) * deviation,
                 interval,
-                determined(value, 0.5 * (interval[1] - interval[0]), one.at_bound(value)),
+                determined(one.size(value), 0.5 * (interval[1] - interval[0]), one.at_bound(value)),
             )
         )
     return tuple(found)

@@ -7,9 +7,9 @@ With x the search's variables of what was free, C their covariance and q the qua
 
 linearised, by differences of 2 n cars. A curve that moves along a direction which the runs do not
 determine has none. By sampling, cars are drawn from the covariance, scaled from the normal
-distribution's quantile to q, and along unknown directions evenly over what the bounds admit; the
-band lies between the 2.5th and the 97.5th percentile of their curves. Figures (`metrics`) go the
-same ways.
+distribution's quantile to q, as far as the bounds admit them, and along unknown directions evenly;
+the band lies between the 2.5th and the 97.5th percentile of their curves. Figures (`metrics`) go
+the same ways.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -30,7 +30,7 @@ from .metrics import metrics
 from .parameters import parameter
 from .problem import FreeParameter
 from .simulation import Model
-from .uncertainty import CONFIDENCE, PART_OF_DIRECTION, Uncertainty
+from .uncertainty import CONFIDENCE, NAMED, PART_OF_DIRECTION, Uncertainty
 from .vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -39,14 +39,14 @@ Method = Literal["linear", "sampled"]
 CARS = 64
 """Cars that are drawn unless told."""
 
-FEWEST_CARS = 16
-"""Cars without which percentiles mean nothing."""
+FEWEST_CARS = 39
+"""Cars between whose outermost 95 % lie on the average."""
+
+DRAWS = 100
+"""Times that a car is drawn until it lies between the bounds."""
 
 STEP = 1e-4
 """Of the differences of x: their error is of its square, that of rounding 1e-12 over it."""
-
-NAMED = 0.2
-"""Component of a unit direction from which a parameter is named with it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -163,8 +163,7 @@ def _sampled(
             f"Of {cars} cars within the fit's errors {int(sound.sum())} come through, too few for "
             "a band; fit with more runs, or simulate something gentler."
         )
-    tail = 50.0 * (1.0 - CONFIDENCE)
-    lower, upper = np.percentile(found.rows[1:][sound], (tail, 100.0 - tail), axis=0)
+    lower, upper = percentiles(found.rows[1:][sound])
     failed = cars - int(sound.sum())
     warnings = []
     if failed:
@@ -175,6 +174,17 @@ def _sampled(
     return _bands(found, lower, upper, warnings)
 
 
+def percentiles(rows: Array) -> Array:
+    """The 2.5th and the 97.5th of cars' curves (cars, values): (2, values).
+
+    The k-th of n sorted values has k / (n + 1) of its distribution below it on the average
+    (Weibull), whatever the distribution is.
+    """
+    tail = 50.0 * (1.0 - CONFIDENCE)
+    found: Array = np.percentile(rows, (tail, 100.0 - tail), axis=0, method="weibull")
+    return found
+
+
 def _failed(rows: Array) -> NDArray[np.bool_]:
     """Which cars did not come through, (cars,)."""
     return np.asarray(np.isnan(rows).all(axis=1), dtype=np.bool_)
@@ -183,14 +193,24 @@ def _failed(rows: Array) -> NDArray[np.bool_]:
 def drawn(
     free: Sequence[FreeParameter], x: Array, errors: Uncertainty, cars: int, seed: int
 ) -> Array:
-    """Variables (cars, n) of cars within a fit's errors, kept between the bounds."""
+    """Variables (cars, n) of cars within a fit's errors and between the bounds.
+
+    A car beyond a bound is drawn anew: moved to the bound in one parameter alone it would leave
+    what the runs hold together.
+    """
     random = np.random.default_rng(seed)
     lower, upper = _bounds(free)
     squares, axes = np.linalg.eigh(errors.covariance)
     scale = errors.quantile / float(norm.ppf(0.5 + CONFIDENCE / 2.0))
     deviations = scale * np.sqrt(np.maximum(squares, 0.0))
     found = x + (random.standard_normal((cars, len(x))) * deviations) @ axes.T
-    found = np.clip(found, lower, upper)
+    for _ in range(DRAWS):
+        beyond = np.any((found < lower) | (found > upper), axis=1)
+        if not beyond.any():
+            break
+        normal = random.standard_normal((int(beyond.sum()), len(x)))
+        found[beyond] = x + (normal * deviations) @ axes.T
+    found = _back_between(x, found, lower, upper)
     for direction in errors.unknown:
         # From where along the direction to where a car stays between the bounds.
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -200,6 +220,15 @@ def drawn(
         end = np.min(np.max(ends, axis=0), axis=1)
         found += np.outer(random.uniform(begin, end), direction)
     return np.clip(found, lower, upper)
+
+
+def _back_between(x: Array, cars: Array, lower: Array, upper: Array) -> Array:
+    """Cars (cars, n), those beyond a bound moved back to it on the straight line to x."""
+    away = cars - x
+    with np.errstate(divide="ignore", invalid="ignore"):
+        room = np.where(away > 0.0, upper - x, lower - x) / away
+    share = np.min(np.where(away == 0.0, 1.0, room), axis=1, initial=1.0)
+    return x + share[:, np.newaxis] * away
 
 
 def _variables(free: Sequence[FreeParameter], vehicle: Vehicle) -> Array:
@@ -214,8 +243,7 @@ def _variables(free: Sequence[FreeParameter], vehicle: Vehicle) -> Array:
 
 
 def _bounds(free: Sequence[FreeParameter]) -> tuple[Array, Array]:
-    ends = [sorted((one.variable(one.lower), one.variable(one.upper))) for one in free]
-    lower, upper = np.array(ends).T
+    lower, upper = np.array([one.ends for one in free]).T
     return lower, upper
 
 

@@ -12,6 +12,10 @@ from dataclasses import dataclass
 from .frames import AXLES, AxleName
 from .vehicle import Vehicle
 
+MATTERS = 0.05
+"""What an error of a slope, or of a height in m, nearer to 0 is judged by: a pivot's angle of as
+many rad makes such a slope, and at an arm of 1 m such a height."""
+
 
 @dataclass(frozen=True, slots=True)
 class Combination:
@@ -19,6 +23,8 @@ class Combination:
 
     of : names of the parameters that it is made of
     signed : whether it may be negative or zero
+    matters : what its error is judged by at least, in place of |value|
+    acts : whether it is what acts in a car
     """
 
     name: str
@@ -28,6 +34,8 @@ class Combination:
     of: tuple[str, ...]
     value: Callable[[Vehicle], float]
     signed: bool = False
+    matters: float = 0.0
+    acts: Callable[[Vehicle], bool] = lambda car: True
 
 
 def _bar(axle: AxleName, number: str, letter: str, name: str, unit: str) -> Combination:
@@ -70,6 +78,12 @@ def _traction_slope(axle: AxleName) -> Combination:
         one = car.axle(axle)
         return math.tan(one.pivot.angle) - one.wheel.radius / one.pivot.distance
 
+    def acts(car: Vehicle) -> bool:
+        """A torque held inside the arm, as of a hub motor, leaves the slope at tan phi."""
+        one = car.axle(axle)
+        braked = car.brakes is not None and car.brakes.reaction == "chassis"
+        return braked or (one.driven and one.torque_reaction == "chassis")
+
     letter = axle[0].upper()
     return Combination(
         name=f"{axle}.traction_slope",
@@ -79,6 +93,8 @@ def _traction_slope(axle: AxleName) -> Combination:
         of=(f"{axle}.pivot.angle", f"{axle}.pivot.distance"),
         value=value,
         signed=True,
+        matters=MATTERS,
+        acts=acts,
     )
 
 
@@ -96,6 +112,7 @@ def _pivot_height(axle: AxleName) -> Combination:
         of=(f"{axle}.pivot.distance", f"{axle}.pivot.angle"),
         value=value,
         signed=True,
+        matters=MATTERS,
     )
 
 

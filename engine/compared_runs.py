@@ -105,7 +105,7 @@ def compared_runs(
         found.append(
             ComparedRun(
                 name,
-                prepare(corrected(run, readings), vehicle, settings),
+                prepare(corrected(run, readings), vehicle, settings, unzeroed=sensors.unzeroed),
                 compared,
                 {channel: float((defaults | stated)[channel]) for channel in compared},
                 {channel: "stated" if channel in stated else "default" for channel in compared},

@@ -35,7 +35,7 @@ def estimates(
         value = one.value(variable)
         at_bound = one.at_bound(value)
         below = above = errors.quantile * deviation
-        if at_bound and variable < 0.5 * sum(map(one.variable, (one.lower, one.upper))):
+        if at_bound and variable < 0.5 * sum(one.ends):
             below, above = math.inf, max(0.0, further - variable + above)
         elif at_bound:
             below, above = max(0.0, variable - further + below), math.inf
@@ -66,7 +66,7 @@ def _size(one: Variable, value: float, runs: Sequence[ComparedRun]) -> float:
         return DELAY_MATTERS
     if isinstance(one, SensorVariable) and one.quantity == "bias":
         return next(_spread(seen, one.channel) for seen in runs if seen.name == one.run)
-    return abs(value)
+    return one.size(value)
 
 
 def _spread(seen: ComparedRun, channel: str) -> float:

@@ -95,9 +95,9 @@ class ExpectedNoise:
         )
         return Information(
             triangle(weighted.reshape(-1, n)),
-            scatter(weighted, density, length),
+            (scatter(weighted, density, length),),
             self.worth * channels * samples * self.step,
-            self.freedom * samples * self.step,
+            (self.freedom * samples * self.step,),
         )
 
 

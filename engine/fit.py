@@ -19,7 +19,8 @@ Array = NDArray[np.float64]
 
 DETERMINED_BELOW = 0.15
 WEAKLY_BELOW = 0.50
-"""Half-width of the 95 % interval over |value| up to which a parameter is determined, or weakly."""
+"""Half-width of the 95 % interval over its size, |value| unless that may be 0, up to which a
+parameter is determined, or weakly."""
 
 DELAY_MATTERS = 0.005
 """What stands for |value| where it is a delay's, s: one sample at the usual rate."""
@@ -45,7 +46,7 @@ class Outcome(StrEnum):
     )
     ASTRAY = (
         "The fit ended further from the measurement than the measurement's own mean; check signs "
-        "and units of the channels, the car's known data and the start values."
+        "and units of the channels, the car's known data, any priors and the start values."
     )
     BUDGET_SPENT = (
         "The fit ran out of evaluations before it converged; begin another from its values, or "
@@ -76,8 +77,9 @@ class Estimate:
     std_error : infinite where the runs do not determine the number
     confidence_interval : 95 %, an end infinite where the runs leave it open: on both sides of a
         number that they do not determine, beyond a bound at which the search ended
-    determined : "yes" (95 % half-width under 15 % of |value|), "weakly" (under 50 %) or "no"
-        (wider, or at a bound, or when the fit did not converge to the runs)
+    determined : "yes" (95 % half-width under 15 % of |value|, of an angle of at least
+        ANGLE_MATTERS), "weakly" (under 50 %) or "no" (wider, or at a bound, or when the fit did not
+        converge to the runs)
     """
 
     name: str
@@ -156,10 +158,10 @@ class CombinationEstimate:
 
 @dataclass(frozen=True, slots=True)
 class Direction:
-    """A way for the parameters to move together, an axis of their joint 95 % region.
+    """A way for the parameters to move together, an axis of their covariance.
 
-    half_width : how far they may go, in the search's variables, where 1 is about 100 %; infinite
-        where the runs do not determine it
+    half_width : of the 95 % interval of how far they go, in the search's variables, where 1 is
+        about 100 %; infinite where the runs do not determine it
     parts : by parameter, the larger components of the unit direction, the largest first
     combination : name of the one that moves along it and hardly otherwise, if there is one
     """
@@ -175,7 +177,7 @@ class Verdict:
 
     parameters : by "yes", "weakly" and "no", their names
     combinations : that the runs determine better than their parameters
-    directions : axes of the joint region, the least determined first
+    directions : axes of the covariance, the least determined first
     sentences : the same for a person
     """
 
@@ -207,7 +209,8 @@ class Whiteness:
 
     statistic : greatest distance of the cumulative periodogram from that of white noise, 0 to 1
     p : probability of such a distance or a greater one, were they white
-    rms : of the residuals, in units of the noise
+    rms : of the residuals, in units of the noise; with a loss, of what stands for them in the
+        errors (`Residuals.of_runs`)
     effective_samples : independent samples that they are worth, of `samples`
     """
 
@@ -324,8 +327,8 @@ class Fit:
     verdict: Verdict
 
 
-def determined(value: float, half_width: float, at_bound: bool = False) -> str:
-    """ "yes", "weakly" or "no"."""
-    if at_bound or not half_width < WEAKLY_BELOW * abs(value):
+def determined(size: float, half_width: float, at_bound: bool = False) -> str:
+    """ "yes", "weakly" or "no" of a half-width judged by a size."""
+    if at_bound or not half_width < WEAKLY_BELOW * size:
         return "no"
-    return "yes" if half_width < DETERMINED_BELOW * abs(value) else "weakly"
+    return "yes" if half_width < DETERMINED_BELOW * size else "weakly"

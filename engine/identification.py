@@ -59,9 +59,6 @@ __all__ = ["Fit", "FreeParameter", "Outcome", "Problem", "Progress", "identify"]
 
 Array = NDArray[np.float64]
 
-OFF_BOUNDS = 1e-3
-"""The search begins at least this share of the range away from a bound."""
-
 MOST_EVALUATIONS = 100
 EVALUATIONS_ON_A_FAULT = 40
 """Trial points spent when a channel probably has the wrong sign or unit: enough should it turn out
@@ -73,7 +70,7 @@ SCATTERED_STARTS = 32
 between the bounds."""
 
 MUCH_BETTER = 0.5
-"""Such a car is taken when its cost is below this share of the start's."""
+"""Such a car is taken when the runs' cost of it is below this share of the start's."""
 
 
 def identify(
@@ -89,7 +86,7 @@ def identify(
     """Fit the problem's free parameters.
 
     progress : called after every evaluation
-    cancelled : polled throughout; Cancelled is raised within a tenth of a second of its being true
+    cancelled : polled throughout; Cancelled is raised within 0.2 s of its being true
     most_evaluations : trial points before a search gives up
     starts : points to try as starts, the told one and others spread over the bounds by `seed`
     simulate : the model, as a function of cars, inputs and traction
@@ -101,13 +98,8 @@ def identify(
         raise ProblemError(f"starts is {starts}; give a number from 1 to {MOST_STARTS}.")
     began = time.perf_counter()
     residuals = Residuals(problem, simulate, cancelled)
-    # A start on a bound leaves the trust region no room and the search ends where it began.
-    room = OFF_BOUNDS * (residuals.upper - residuals.lower)
-    x_start = np.clip(
-        [one.variable(one.start) for one in problem.variables],
-        residuals.lower + room,
-        residuals.upper - room,
-    )
+    lower, upper = residuals.starts_between
+    x_start = np.clip([one.variable(one.start) for one in problem.variables], lower, upper)
     x_start, moved = _usable_start(residuals, x_start)
     start = residuals.model(x_start)
 
@@ -115,7 +107,6 @@ def identify(
     doubted = _in_doubt(residuals, x_start)
     if doubted:  # where other starts would mean nothing either
         most_evaluations, starts = min(most_evaluations, EVALUATIONS_ON_A_FAULT), 1
-    lower, upper = residuals.lower + room, residuals.upper - room
     others = spread(problem.of_car(lower), problem.of_car(upper), starts - 1, seed)
     of_sensors = x_start[len(problem.free) :]
     others = [np.concatenate([of_car, of_sensors]) for of_car in others]
@@ -207,7 +198,7 @@ def _usable_start(residuals: Residuals, x: Array) -> tuple[Array, list[str]]:
     """
     r = residuals.vector(x)
     failed = bool(np.any(r == FAILED_TRIAL))
-    cost = residuals.cost(x, r)
+    cost = residuals.cost_of_runs(r)
     if cost <= residuals.scatter():
         return x, []
     if not failed and _in_doubt(residuals, x):
@@ -223,7 +214,7 @@ def _usable_start(residuals: Residuals, x: Array) -> tuple[Array, list[str]]:
     ):
         lower, upper = (np.where(of_sensors, x, end) for end in ends)
         trials = [lower + (upper - lower) * share for share in spread]
-        costs = residuals.costs(trials)
+        costs = residuals.costs_of_runs(trials)
         best = int(np.argmin(costs))
         if costs[best] < MUCH_BETTER * cost:
             return trials[best], [
@@ -322,7 +313,7 @@ def _outcome(
         return Outcome.BUDGET_SPENT
     if found.ending == Ending.STUCK:
         return Outcome.STUCK
-    if found.cost > residuals.scatter():
+    if residuals.cost_of_runs(found.residuals) > residuals.scatter():
         return Outcome.ASTRAY
     if any(one.at_bound for one in (*parameters, *sensors)):
         return Outcome.AT_BOUND

@@ -13,21 +13,12 @@ from numpy.typing import NDArray
 from scipy.stats.qmc import Sobol
 
 from .fit import Ending
-from .search import SAME_POINT, Found, Search
+from .search import Found, Search
 
 Array = NDArray[np.float64]
 
 REFINED = 8
 """Searches run to their end, that from the told start among them."""
-
-SAME_COST = 1e-4
-"""Relative difference of cost up to which two minima may be one (as may those whose costs differ
-by less than a move of SAME_POINT does at the stated noise), and ..."""
-
-SAME_VALUES = 1e-3
-"""... difference in every one of the optimiser's variables, where `search.SAME_POINT` does not say
-so already."""
-
 
 SEARCH_OF_START = 1.75
 """Single fits that the search from another start is worth, most of it on the way to a basin, ..."""
@@ -85,9 +76,4 @@ def _ended_in(minimum: list[Found], found: Found) -> bool:
     """Whether a refinement ended in a minimum, given as all that ended there before."""
     if found.minimum is not None:
         return any(one is found.minimum for one in minimum)
-    first = minimum[0]
-    apart = abs(first.cost - found.cost)
-    if apart > max(SAME_COST * min(first.cost, found.cost), 0.5 * SAME_POINT**2):
-        return False
-    near = float(np.max(np.abs(first.x - found.x))) <= SAME_VALUES
-    return near or max(first.distance(found.x), found.distance(first.x)) <= SAME_POINT
+    return minimum[0].is_same_minimum(found)

@@ -29,7 +29,9 @@ MEDIAN_OF_NORMAL = 0.6745
 def with_found_noise(
     search: Search, reached: list[list[Found]], most_evaluations: int
 ) -> list[list[Found]]:
-    """The minima, refined with the noise that is to be found from their lowest's residuals."""
+    """The minima, refined with the noise that is to be found from their lowest's residuals; what
+    is one minimum with it, is one of them.
+    """
     for _ in range(NOISE_ROUNDS):
         noise = _found_noise(search.residuals, reached[0][0].residuals)
         known = {seen.name: seen.noise for seen in search.residuals.problem.runs}
@@ -43,8 +45,20 @@ def with_found_noise(
             [replace(search.refine(of[0].x, most_evaluations), told=of[0].told), *of[1:]]
             for of in reached
         ]
-        reached.sort(key=lambda of: of[0].cost)
+        reached = _regrouped(reached)
     return reached
+
+
+def _regrouped(reached: list[list[Found]]) -> list[list[Found]]:
+    """Distinct minima, the lowest first, each with all that ended there."""
+    minima: list[list[Found]] = []
+    for ended in sorted(reached, key=lambda of: of[0].cost):
+        same = next((of for of in minima if of[0].is_same_minimum(ended[0])), None)
+        if same is None:
+            minima.append(ended)
+        else:
+            same += ended
+    return minima
 
 
 def _found_noise(residuals: Residuals, r: Array) -> dict[tuple[str, str], float]:

@@ -1,10 +1,10 @@
 """Whether the runs agree with what was known before them.
 
-Without the prior of parameter k, of residual q and slope w in the optimiser's variable x, the cost
-falls on from its minimum, with the gradient -w q in x_k; by its second derivative H from runs and
-other priors its minimum would be
+The cost has the gradient g at the solution x in the optimiser's variables, 0 but at a bound.
+Without the prior of parameter k, of residual q and slope w, it is g - w q e_k, and by the second
+derivative H from runs and other priors the minimum would be, bounds aside,
 
-    x + H^-1 e_k w q.
+    x - H^-1 (g - w q e_k).
 
 x_k there has the error that runs and other priors leave it, by the residuals there (those at the
 minimum hold the very disagreement), and the prior has 1 / w; the two are independent.
@@ -33,27 +33,31 @@ def prior_checks(residuals: Residuals, found: Found, said: Information) -> tuple
     problem = residuals.problem
     rows, weights = residuals.prior_rows(found.x), residuals.prior_slopes()
     told = residuals.of_priors()
+    gradient = found.jacobian.T @ found.rows
     checks = []
     for row, prior in enumerate(problem.priors):
         k = int(np.flatnonzero(weights[row])[0])
         one, weight, q = problem.free[k], float(weights[row, k]), float(rows[row])
         others = (*told[:row], *told[row + 1 :])
         inverse = np.linalg.pinv(sum(others, start=said).root, rcond=DIRECTION_TOLERANCE)
-        step = inverse @ inverse[k] * weight * q
+        without = gradient.copy()
+        without[k] -= weight * q
+        step = -inverse @ (inverse.T @ without)
         there = information(residuals.of_runs(found.residuals + found.slopes @ step, found.slopes))
         error = float(uncertainty(sum(others, start=there)).std_error[k])
         if not np.isfinite(error):
             checks.append(PriorCheck(prior.name, prior.mean, prior.deviation, None, None, None))
             continue
         x = float(found.x[k] + step[k])
+        value, _ = one.interval(x, 0.0, 0.0)
         away = x - one.variable(prior.mean)
         checks.append(
             PriorCheck(
                 name=prior.name,
                 mean=prior.mean,
                 deviation=prior.deviation,
-                without=one.value(x),
-                without_std_error=error * abs(one.slope(x)),
+                without=value,
+                without_std_error=error * (abs(value) if one.logarithmic else one.scale),
                 apart=away / float(np.hypot(error, 1.0 / weight)),
             )
         )

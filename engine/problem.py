@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .car_rows import car_rows
-from .channels import Run
+from .channels import OUTPUT_CHANNELS, Run
 from .compared_runs import ComparedRun, compared_runs, require_motion
 from .equilibrium import static_loads
 from .errors import ProblemError, VehicleError
@@ -102,6 +102,12 @@ class Problem:
         model = sensor_model(
             sensors or {}, fit_noise=fit_noise, biased=settings.output_highpass_hz is None
         )
+        biased = [name for name in OUTPUT_CHANNELS if name in model.unzeroed]
+        if biased and settings.initial_state == "measured":
+            raise ProblemError(
+                f"The bias of {biased[0]} is to be fitted, but the measured initial_state would "
+                "begin with it; begin in equilibrium, or state the bias."
+            )
         compared = compared_runs(vehicle, runs, noise or {}, outputs, settings, model)
         fitted = model.variables([(seen.name, seen.measured) for seen in compared])
         samples = sum(len(measured) for seen in compared for measured in seen.measured.values())

@@ -5,7 +5,8 @@ The rise D(p) = 2 (cost(p) - cost at the fit) is turned into a distance in stand
 
     t(p)^2 = D(p) (s_0 / s)^2,
 
-with s_0 the error by the cost's second derivative alone, s_0^2 = (J^T J)^-1, and s that of
+with s_0 the error by the cost's second derivative alone, s_0^2 = (J^T J)^-1 (with a loss, J as in
+`Residuals.of_runs`: what keeps w above 0 for the search would not be that of D), and s that of
 `uncertainty`, which knows how correlated the residuals are (Pace & Salvan, Principles of
 Statistical Inference, 1997, 4.7: the scaled likelihood ratio of a wrong likelihood). The 95 %
 interval is where t stays below the quantile. Where the fit is as good as linear it is that of the
@@ -23,7 +24,7 @@ from numpy.typing import NDArray
 
 from .errors import ProblemError
 from .parameters import parameter
-from .problem import Problem
+from .problem import FreeParameter, Problem
 from .residuals import Residuals, Simulate
 from .search import Found, Search
 from .simulation import rims_batch
@@ -35,7 +36,8 @@ STRIDE = 0.5
 """Between two points, in standard errors; where the error is unknown or large ..."""
 
 MOST_STRIDE = 0.25
-"""... at most so much of the search's variable, where 1 is about 100 %."""
+"""... at most so much of the search's variable, where 1 is about 100 %; more where a side's points
+would reach neither its bound nor the quantile."""
 
 PAST = 1.1
 """Quantiles from the fit at which a side ends."""
@@ -45,9 +47,6 @@ POINTS = 16
 
 EVALUATIONS = 40
 """For each point at most."""
-
-OFF_BOUNDS = 1e-3
-"""The others begin at least this share of their range away from their bounds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,27 +97,29 @@ def profile(
     Raises ProblemError for a parameter that is not free, ParameterError for a name that is none,
     and Cancelled.
     """
-    known = parameter(name).name
-    require_free(problem, [known])
-    held = [one.name for one in problem.free].index(known)
+    full = parameter(name).name
+    require_free(problem, [full])
+    held = [one.name for one in problem.free].index(full)
     residuals = Residuals(problem, simulate, cancelled)
     start = [one.variable(one.start) for one in problem.variables]
-    best = Search(residuals).refine(_off_bounds(start, residuals), EVALUATIONS)
+    best = Search(residuals).refine(np.clip(start, *residuals.starts_between), EVALUATIONS)
     said = information(residuals.of_runs(best.residuals, best.slopes))
-    errors = uncertainty(sum(residuals.of_priors(), start=said))
-    tour = _Tour(problem, held, best, float(errors.std_error[held]), residuals)
+    known = sum(residuals.of_priors(), start=said)
+    errors = uncertainty(known)
+    curvature = known.root.T @ known.root
+    tour = _Tour(problem, held, best, curvature, float(errors.std_error[held]), residuals)
     told = progress or (lambda points: None)
     below = tour.points(-1.0, errors.quantile, told)
     above = tour.points(1.0, errors.quantile, told)
     points = [*reversed(below), tour.centre, *above]
     one = problem.free[held]
     return Profile(
-        name=known,
+        name=full,
         points=tuple(points),
         quantile=errors.quantile,
         confidence_interval=(
-            _end([tour.centre, *below], errors.quantile, -math.inf),
-            _end([tour.centre, *above], errors.quantile, math.inf),
+            _end(one, [tour.centre, *below], errors.quantile, -math.inf),
+            _end(one, [tour.centre, *above], errors.quantile, math.inf),
         ),
         lower_at_bound=one.at_lower(points[0].value),
         upper_at_bound=one.at_upper(points[-1].value),
@@ -138,11 +139,17 @@ class _Tour:
     """The way along one parameter, away from the best fit to either side."""
 
     def __init__(
-        self, problem: Problem, held: int, best: Found, error: float, residuals: Residuals
+        self,
+        problem: Problem,
+        held: int,
+        best: Found,
+        curvature: Array,
+        error: float,
+        residuals: Residuals,
     ):
         self._problem, self._held, self._best, self._all = problem, held, best, residuals
         self.simulations = residuals.simulations
-        inverse = np.linalg.pinv(best.curvature, rcond=DIRECTION_TOLERANCE**2, hermitian=True)
+        inverse = np.linalg.pinv(curvature, rcond=DIRECTION_TOLERANCE**2, hermitian=True)
         blind = math.sqrt(float(inverse[held, held]))
         known = math.isfinite(error) and error > 0.0
         self._ratio = blind / error if known else 1.0
@@ -160,11 +167,11 @@ class _Tour:
         at = float(self._best.x[self._held])
         others, slope = np.delete(self._best.x, self._held), self._slope
         rising = one.variable(one.upper) > one.variable(one.lower)
-        step = (way if rising else -way) * self._stride
-        first, last = sorted((one.variable(one.lower), one.variable(one.upper)))
+        ahead, stride, before = (way if rising else -way), self._stride, 0.0
+        first, last = one.ends
         found: list[ProfilePoint] = []
         while len(found) < POINTS and first < at < last:
-            further = min(max(at + step, first), last)
+            further = min(max(at + ahead * stride, first), last)
             moved, cost = self._refitted(further, others + slope * (further - at))
             rise = max(2.0 * (cost - self._best.cost), 0.0)
             distance = way * math.sqrt(rise) * self._ratio
@@ -174,6 +181,11 @@ class _Tour:
             at, others = further, moved
             if abs(distance) > PAST * quantile:
                 break
+            left, rate = POINTS - len(found), abs(distance - before)
+            if left and abs(distance) + left * rate < PAST * quantile:
+                room = last - at if ahead > 0.0 else at - first
+                stride = max(stride, room / left)
+            before = distance
         return found
 
     def _refitted(self, at: float, others: Array) -> tuple[Array, float]:
@@ -190,7 +202,8 @@ class _Tour:
                 priors=tuple(each for each in problem.priors if each.name != one.name),
             )
         )
-        found = Search(residuals).refine(_off_bounds(others, residuals), EVALUATIONS)
+        start = np.clip(others, *residuals.starts_between)
+        found = Search(residuals).refine(start, EVALUATIONS)
         self.simulations += residuals.simulations
         of_it = [each.residual(one, at) for each in problem.priors if each.name == one.name]
         return found.x, found.cost + 0.5 * sum(residual**2 for residual in of_it)
@@ -203,15 +216,13 @@ class _Tour:
         return ProfilePoint(one.value(at), distance, cost, values)
 
 
-def _off_bounds(x: Sequence[float] | Array, residuals: Residuals) -> Array:
-    room = OFF_BOUNDS * (residuals.upper - residuals.lower)
-    return np.clip(x, residuals.lower + room, residuals.upper - room)
-
-
-def _end(points: Sequence[ProfilePoint], quantile: float, otherwise: float) -> float:
+def _end(
+    one: FreeParameter, points: Sequence[ProfilePoint], quantile: float, otherwise: float
+) -> float:
     """The value at which t reaches the quantile, between the points, from the fit outwards."""
     for near, far in pairwise(points):
         if abs(far.distance) >= quantile:
             share = (quantile - abs(near.distance)) / (abs(far.distance) - abs(near.distance))
-            return near.value + share * (far.value - near.value)
+            begin, end = one.variable(near.value), one.variable(far.value)
+            return one.value(begin + share * (end - begin))
     return otherwise

@@ -5,6 +5,7 @@ what drives the model leaves nothing to be learnt from the run.
 """
 
 import math
+from collections.abc import Set as AbstractSet
 from typing import NamedTuple
 
 import numpy as np
@@ -87,12 +88,19 @@ def check_recording(run: Run) -> list[Finding]:
     ]
 
 
-def check_on_car(run: Run, standing: bool, rises: Array | None, vehicle: Vehicle) -> list[Finding]:
+def check_on_car(
+    run: Run,
+    standing: bool,
+    rises: Array | None,
+    vehicle: Vehicle,
+    unzeroed: AbstractSet[str] = frozenset(),
+) -> list[Finding]:
     """Findings about such a run once it is known which car follows it.
 
     standing : of `stands`; rises : of `wheel_order.wheel_rises`
+    unzeroed : channels whose rest values are to be found, so that they may have any
     """
-    rest_values = _rest_values(run, vehicle) if standing else []
+    rest_values = _rest_values(run, vehicle, unzeroed) if standing else []
     exchanged = [] if rises is None else exchanged_wheels(run, rises, vehicle.wheelbase)
     return [
         *(Finding(sentence, False) for sentence in rest_values),
@@ -127,13 +135,17 @@ def _start(run: Run) -> NDArray[np.bool_]:
     return run.time - run.time[0] <= REST_WINDOW
 
 
-def _rest_values(run: Run, vehicle: Vehicle) -> list[str]:
+def _rest_values(run: Run, vehicle: Vehicle, unzeroed: AbstractSet[str]) -> list[str]:
     """Channels of a standing car that do not read what its wheels put them at, and a_x not zero."""
     start = _start(run)
     on_wheels = _plane(vehicle, [np.mean(run[name][start]) for name in WHEEL_CHANNELS])
     expected = dict(zip(OUTPUT_CHANNELS, on_wheels, strict=True)) | {"chassis.a_x": 0.0}
+    if not unzeroed.isdisjoint(WHEEL_CHANNELS):  # which are what the body stands on
+        unzeroed = unzeroed | set(OUTPUT_CHANNELS)
     readings = []
     for name, value in expected.items():
+        if name in unzeroed:
+            continue
         rest = float(np.mean(run[name][start])) if name in run else value
         if abs(rest - value) > REST_LIMITS[name]:
             shown = channel(name)

@@ -55,6 +55,10 @@ Histories = Mapping[str, Array]
 DIFFERENCE = 1e-4
 """Step h of the differences of x."""
 
+OFF_BOUNDS = 1e-3
+"""A search begins at least this share of the range away from a bound: a start on it leaves the
+trust region no room, and the search ends where it began."""
+
 QUICK_DIFFERENCE = 1e-6
 """Step of the differences of first order of x, whose error is of order h + 1e-13 / h."""
 
@@ -116,8 +120,7 @@ class Residuals:
     ):
         check_start(problem)
         self.problem = problem
-        ends = [sorted(map(one.variable, (one.lower, one.upper))) for one in problem.variables]
-        self.lower, self.upper = np.array(ends).T
+        self.lower, self.upper = np.array([one.ends for one in problem.variables]).T
         self.simulations = 0
         self._simulate = simulate
         self._cancelled = cancelled
@@ -129,6 +132,12 @@ class Residuals:
         self._simulated = [*range(len(problem.free)), *self._driving]
         places = {one.name: place for place, one in enumerate(problem.free)}
         self._priors = [(one, places[one.name]) for one in problem.priors]
+
+    @property
+    def starts_between(self) -> tuple[Array, Array]:
+        """Between what a search may begin, each (n,)."""
+        room = OFF_BOUNDS * (self.upper - self.lower)
+        return self.lower + room, self.upper - room
 
     def of(self, problem: Problem) -> "Residuals":
         """Those of another problem with the same model, under the same watch."""
@@ -177,9 +186,9 @@ class Residuals:
         return [
             Information(
                 root=triangle(row[np.newaxis]),
-                scatter=np.outer(row, row),
+                scatters=(np.outer(row, row),),
                 samples=1.0,
-                freedom=0.0,
+                freedoms=(np.inf,),
             )
             for row in self.prior_slopes()
         ]
@@ -220,17 +229,24 @@ class Residuals:
 
     def costs(self, trials: Sequence[Array]) -> Array:
         """The cost at each of many points, infinite where the car fails."""
+        return self.costs_of_runs(trials) + np.array([self._cost_of_priors(x) for x in trials])
+
+    def costs_of_runs(self, trials: Sequence[Array]) -> Array:
+        """The same without the priors."""
         rows, _ = self._batch(trials)
-        of_priors = [0.5 * float(np.sum(self.prior_rows(x) ** 2)) for x in trials]
-        return np.nan_to_num(self.problem.loss.costs(rows), nan=np.inf) + np.array(of_priors)
+        return np.nan_to_num(self.problem.loss.costs(rows), nan=np.inf)
 
     def cost(self, x: Array, r: Array) -> float:
-        """Half the sum of the residuals' and the priors' squares as the loss counts them; a failed
-        car is no outlier and costs the squares themselves.
-        """
+        """Half the sum of the residuals' squares as the loss counts them, and of the priors'."""
+        return self.cost_of_runs(r) + self._cost_of_priors(x)
+
+    def cost_of_runs(self, r: Array) -> float:
+        """The same without the priors; a failed car is no outlier and costs the squares."""
         failed = np.any(r == FAILED_TRIAL)
-        of_runs = 0.5 * float(r @ r) if failed else float(self.problem.loss.costs(r))
-        return of_runs + 0.5 * float(np.sum(self.prior_rows(x) ** 2))
+        return 0.5 * float(r @ r) if failed else float(self.problem.loss.costs(r))
+
+    def _cost_of_priors(self, x: Array) -> float:
+        return 0.5 * float(np.sum(self.prior_rows(x) ** 2))
 
     def prior_rows(self, x: Array) -> Array:
         """The priors' residuals, (priors,)."""
@@ -266,7 +282,7 @@ class Residuals:
         return found
 
     def scatter(self) -> float:
-        """Cost of a model that stays at each channel's mean."""
+        """The runs' cost of a model that stays at each channel's mean."""
         return sum(
             float(self.problem.loss.costs((block.measured - np.mean(block.measured)) / block.noise))
             for block in self.blocks()

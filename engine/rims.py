@@ -8,6 +8,7 @@ Where the samples do not fall on nodes, the model's z, pitch and roll are carrie
 Hermite interpolation from their values and rates.
 """
 
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 
 import numpy as np
@@ -95,20 +96,33 @@ class RimsInputs:
         )
 
 
-def prepare(run: Run, vehicle: Vehicle, settings: RimsSettings | None = None) -> RimsInputs:
-    """Inputs of the rims mode for one run and one car; raises what its two parts do."""
-    return for_car(recorded_motion(run, settings or RimsSettings()), vehicle)
+def prepare(
+    run: Run,
+    vehicle: Vehicle,
+    settings: RimsSettings | None = None,
+    *,
+    unzeroed: AbstractSet[str] = frozenset(),
+) -> RimsInputs:
+    """Inputs of the rims mode for one run and one car; raises what its two parts do.
+
+    unzeroed : channels whose rest values are to be found
+    """
+    return for_car(recorded_motion(run, settings or RimsSettings()), vehicle, unzeroed)
 
 
-def for_car(motion: RecordedMotion, vehicle: Vehicle) -> RimsInputs:
+def for_car(
+    motion: RecordedMotion, vehicle: Vehicle, unzeroed: AbstractSet[str] = frozenset()
+) -> RimsInputs:
     """Inputs of the rims mode for a car that follows a recorded motion.
 
+    unzeroed : channels whose rest values are to be found
     Raises MeasurementError when braking is marked outside the run, VehicleError when it is marked
     for a vehicle without brakes.
     """
     run, fraction = motion.run, motion.sample_fraction
     intervals, unbraked = braking_of(run, motion.slow_a_x, vehicle, rolling_resistance(vehicle))
-    findings = (*motion.findings, *check_on_car(run, motion.stands, motion.wheel_rises, vehicle))
+    on_car = check_on_car(run, motion.stands, motion.wheel_rises, vehicle, unzeroed)
+    findings = (*motion.findings, *on_car)
     told = (finding.sentence for finding in findings)
     return RimsInputs(
         name=run.name,

@@ -35,6 +35,14 @@ promises there, for the point to lie in the basin of that minimum."""
 SAME_POINT = 0.1
 """Standard errors within which two points are the same minimum."""
 
+SAME_COST = 1e-4
+"""Relative difference of cost up to which two minima may be one (as may those whose costs differ
+by less than a move of SAME_POINT does at the stated noise), and ..."""
+
+SAME_VALUES = 1e-3
+"""... difference in every one of the optimiser's variables, where SAME_POINT does not say so
+already."""
+
 
 @dataclass(frozen=True, slots=True)
 class Found:
@@ -72,6 +80,14 @@ class Found:
         away = x - self.x
         rise = float(away @ self.curvature @ away)
         return float(np.sqrt(max(rise, 0.0) / max(self.variance(), np.finfo(float).tiny)))
+
+    def is_same_minimum(self, other: "Found") -> bool:
+        """Whether another refinement ended in the same minimum."""
+        apart = abs(self.cost - other.cost)
+        if apart > max(SAME_COST * min(self.cost, other.cost), 0.5 * SAME_POINT**2):
+            return False
+        near = float(np.max(np.abs(self.x - other.x))) <= SAME_VALUES
+        return near or max(self.distance(other.x), other.distance(self.x)) <= SAME_POINT
 
     def beyond(self) -> Array:
         """Where the search would go on to were there no bounds."""

@@ -82,6 +82,11 @@ class SensorModel:
             if name in self.fixed or name in self.fitted
         }
 
+    @property
+    def unzeroed(self) -> frozenset[str]:
+        """Channels whose bias is to be found."""
+        return frozenset(name for name, asked in self.fitted.items() if "bias" in asked)
+
     def reading(self, name: str, found: Mapping[str, float] | None = None) -> Reading:
         """The sensor of a channel, with fitted quantities as found, else ideal."""
         one = {**NOMINAL, **self.fixed.get(name, {}), **(found or {})}

@@ -29,10 +29,15 @@ s^2 it leaves, with the hat matrix H = J B J^T,
 so the spectrum of g_aa is divided by that of the bracket, that of g_ab by the root of both
 channels'. Summed over all frequencies this is the textbook's N - n in place of N.
 
-Intervals take Student's t with the degrees of freedom of M, 3 N/m a run (Bartlett's window;
-Priestley, Spectral Analysis and Time Series, 1981, table 6.2), or with those of the residuals,
-where they are fewer: correlated ones count for N / sum w_k^2 (g_k/g_0)^2 samples, over lags of both
-signs.
+Intervals take Student's t. A run's part of M has f_r = 3 N/m degrees of freedom (Bartlett's
+window; Priestley, Spectral Analysis and Time Series, 1981, table 6.2), a prior's, which is known,
+infinitely many. The variance v = sum v_r of a variable has
+
+    f = v^2 / sum (v_r^2 / f_r)
+
+of them (Satterthwaite, Biometrics Bulletin 2, 1946), so that a run counts as far as the error is
+its; the quantile is that of the variables' harmonic mean. Where those of the residuals are fewer,
+it is theirs: correlated ones count for N / sum w_k^2 (g_k/g_0)^2 samples, over lags of both signs.
 
 Directions which the runs do not move at all are found in the singular value decomposition of J:
 s_i <= DIRECTION_TOLERANCE s_max, or s_i <= LEAST_EFFECT. A parameter with a part in such a
@@ -63,6 +68,9 @@ thousandth of one sample's noise, over the whole campaign."""
 PART_OF_DIRECTION = 1e-3
 """Component of a unit direction from which a parameter counts as part of it."""
 
+NAMED = 0.2
+"""Component of a unit direction from which a parameter is named with it."""
+
 BODY_MEMORY = 1.0
 """Lags over which residuals may always be correlated, s: a period of the body on its springs."""
 
@@ -92,23 +100,27 @@ class Information:
     """What runs say of n parameters; that of several runs is the sum.
 
     root : (n, n) triangle R with R^T R = J^T J
-    scatter : (n, n) M
+    scatters : (n, n) each, whose sum is M;  freedoms : their degrees of freedom
     samples : effective number of them
-    freedom : degrees of freedom of M
     """
 
     root: Array
-    scatter: Array
+    scatters: tuple[Array, ...]
     samples: float
-    freedom: float
+    freedoms: tuple[float, ...]
+
+    @property
+    def scatter(self) -> Array:
+        """(n, n) M."""
+        return sum(self.scatters, start=np.zeros_like(self.root))
 
     def __add__(self, other: "Information") -> "Information":
         """What both say together."""
         return Information(
             triangle(np.concatenate([self.root, other.root])),
-            self.scatter + other.scatter,
+            self.scatters + other.scatters,
             self.samples + other.samples,
-            self.freedom + other.freedom,
+            self.freedoms + other.freedoms,
         )
 
     def marginal(self, kept: Sequence[int]) -> "Information":
@@ -131,9 +143,8 @@ class Information:
         score = np.zeros((len(kept), len(self.root)))
         score[range(len(kept)), kept] = 1.0
         score[:, others] = -taken
-        return Information(
-            triangle(beside), score @ self.scatter @ score.T, self.samples, self.freedom
-        )
+        scatters = tuple(score @ one @ score.T for one in self.scatters)
+        return Information(triangle(beside), scatters, self.samples, self.freedoms)
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,16 +209,12 @@ def information(runs: Iterable[RunResiduals]) -> Information:
     root = triangle(np.concatenate([run.jacobian.reshape(-1, n) for run in runs]))
     bread = bread_of(root)[0]
     widths = [bandwidth(run.residuals, run.step) for run in runs]
-    scatters = [_scatter(run, width, bread) for run, width in zip(runs, widths, strict=True)]
+    pairs = list(zip(runs, widths, strict=True))
     return Information(
         root,
-        np.sum(scatters, axis=0),
-        sum(
-            effective_samples(channel, width)
-            for run, width in zip(runs, widths, strict=True)
-            for channel in run.residuals
-        ),
-        sum(3.0 * run.residuals.shape[1] / width for run, width in zip(runs, widths, strict=True)),
+        tuple(_scatter(run, width, bread) for run, width in pairs),
+        sum(effective_samples(channel, width) for run, width in pairs for channel in run.residuals),
+        tuple(3.0 * run.residuals.shape[1] / width for run, width in pairs),
     )
 
 
@@ -219,9 +226,21 @@ def uncertainty(known: Information) -> Uncertainty:
     scattered = np.sqrt(np.maximum(np.diag(known.scatter), 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):
         alone = np.where(effect > least, scattered / effect**2, np.inf)
-    freedom = max(min(known.samples - len(bread), known.freedom), 1.0)
+    freedom = max(min(known.samples - len(bread), _freedom(known, bread)), 1.0)
     quantile = float(student_t.ppf(0.5 + CONFIDENCE / 2.0, freedom))
     return Uncertainty(covariance, unknown, quantile, alone)
+
+
+def _freedom(known: Information, bread: Array) -> float:
+    """Harmonic mean of the variables' degrees of freedom; infinite where nothing scatters."""
+    parts = np.array([np.diag(bread @ one @ bread) for one in known.scatters])
+    variances = np.sum(parts, axis=0)
+    scattered = variances > 0.0
+    if not np.any(scattered):
+        return np.inf
+    shares = parts[:, scattered] / variances[scattered]
+    inverse = np.sum(shares**2 / np.array(known.freedoms)[:, np.newaxis], axis=0)
+    return 1.0 / float(np.mean(inverse)) if np.any(inverse > 0.0) else np.inf
 
 
 def bread_of(root: Array) -> tuple[Array, Array, float]:

@@ -9,11 +9,15 @@ from dataclasses import dataclass
 
 from .parameters import parameter
 
+ANGLE_MATTERS = 0.05
+"""What an error of a pivot's angle nearer to 0 is judged by, rad: 3 degrees."""
+
 FARTHEST = 1e3
 """Factor from a value to the end of its interval beyond which the end is not worth telling."""
 
 AT_BOUND = 1e-3
-"""A value nearer to a bound than this share of the range between the bounds is at it."""
+"""A value whose variable is nearer to that of a bound than this share of the range between the
+bounds is at it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,21 +53,35 @@ class Variable:
         """The number at a variable, kept between the bounds against rounding."""
         return min(max(self._unbounded(variable), self.lower), self.upper)
 
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The lower and the upper end of the variable's range."""
+        low, high = sorted((self.variable(self.lower), self.variable(self.upper)))
+        return low, high
+
     def at_bound(self, value: float) -> bool:
-        """Whether a value is at a bound."""
-        return self.at_lower(value) or self.at_upper(value)
+        """Whether a value is at one of its bounds."""
+        return self._is_at(self.lower, value) or self._is_at(self.upper, value)
 
     def at_lower(self, value: float) -> bool:
-        """Whether a value is at the lower bound."""
-        return value - self.lower < AT_BOUND * (self.upper - self.lower)
+        """Whether a value is at its lower bound."""
+        return self._is_at(self.lower, value)
 
     def at_upper(self, value: float) -> bool:
-        """Whether a value is at the upper bound."""
-        return self.upper - value < AT_BOUND * (self.upper - self.lower)
+        """Whether a value is at its upper bound."""
+        return self._is_at(self.upper, value)
+
+    def _is_at(self, bound: float, value: float) -> bool:
+        low, high = self.ends
+        return abs(self.variable(value) - self.variable(bound)) < AT_BOUND * (high - low)
 
     def slope(self, variable: float) -> float:
         """d value / d variable."""
         return self.value(variable) if self.logarithmic else self.scale
+
+    def size(self, value: float) -> float:
+        """What the error of a value is judged by: |value|."""
+        return abs(value)
 
     def interval(self, variable: float, below: float, above: float) -> tuple[float, float]:
         """Values from so far below a variable to so far above it, bounds aside. An end is infinite
@@ -101,3 +119,8 @@ class FreeParameter(Variable):
     def unit(self) -> str:
         """SI unit of the parameter."""
         return parameter(self.name).unit
+
+    def size(self, value: float) -> float:
+        """|value|, and of a pivot's angle, which may be 0, at least ANGLE_MATTERS."""
+        angle = self.name.endswith("pivot.angle")
+        return max(abs(value), ANGLE_MATTERS) if angle else abs(value)

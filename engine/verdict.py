@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from .combinations import COMBINATIONS, Combination
 from .fit import CombinationEstimate, Direction, ParameterEstimate, Verdict, determined
 from .parameters import parameter
-from .uncertainty import Uncertainty
+from .uncertainty import NAMED, Uncertainty
 from .units import after_number, in_percent
 from .variables import moved
 from .vehicle import Vehicle
@@ -32,9 +32,6 @@ PART_OF_APART = 1.0 / 3.0
 
 STEP = 1e-4
 """Of the central differences that make g; their error is of order STEP^2."""
-
-LOUD = 0.2
-"""Component of a unit direction from which a parameter is named with it."""
 
 ALONG = 0.95
 """Cosine of the angle between an axis and the gradient of a combination that it stands for."""
@@ -54,7 +51,7 @@ def verdict(
     gradients = {
         one.name: _gradient(one, estimates, vehicle)
         for one in COMBINATIONS
-        if sum(name in names for name in one.of) > 1
+        if one.acts(vehicle) and sum(name in names for name in one.of) > 1
     }
     combined = [
         estimate
@@ -110,8 +107,9 @@ def _held_together(
     vehicle: Vehicle,
 ) -> CombinationEstimate | None:
     """The combination, if the runs hold it better than what it is made of."""
-    members = [k for k, of in enumerate(estimates) if of.name in one.of]
-    if not np.any(gradient):
+    # A parameter may have no part in it here, as the arm of a bar without a rate.
+    members = [k for k, slope in enumerate(gradient.tolist()) if slope]
+    if not members:
         return None
     estimate = _estimate(one, gradient, errors, vehicle)
     apart = float(np.linalg.norm(gradient[members] * errors.std_error[members]))
@@ -137,7 +135,7 @@ def _estimate(
         value=value,
         std_error=error if one.signed else error * value,
         confidence_interval=(low, high),
-        determined=determined(value, 0.5 * (high - low)),
+        determined=determined(max(abs(value), one.matters), 0.5 * (high - low)),
     )
 
 
@@ -159,7 +157,7 @@ def _parts(names: Sequence[str], axis: Array) -> dict[str, float]:
     """The loud components, the loudest first and positive."""
     order: list[int] = np.argsort(-np.abs(axis)).tolist()
     sign = float(np.sign(axis[order[0]]))
-    return {names[k]: sign * float(axis[k]) for k in order if abs(float(axis[k])) >= LOUD}
+    return {names[k]: sign * float(axis[k]) for k in order if abs(float(axis[k])) >= NAMED}
 
 
 def _along(axis: Array, gradients: Mapping[str, Array]) -> str | None:
@@ -189,10 +187,13 @@ def _of_parameters(classes: Mapping[str, Sequence[str]]) -> list[str]:
 def _of_combination(one: CombinationEstimate, known: Sequence[str]) -> str:
     apart = [parameter(name).symbol for name in one.of if name not in known]
     low, high = one.confidence_interval
-    half_width = 0.5 * (high - low) / abs(one.value)
+    half_width, unit = 0.5 * (high - low), after_number(one.unit)
+    if low < 0.0 < high:
+        told = f"{one.value:.4g} ± {half_width:.2g}{unit}"
+    else:
+        told = f"{one.value:.4g}{unit} to {in_percent(half_width / abs(one.value))}"
     are = "are determined only together" if len(apart) > 1 else "is determined better"
     return (
         f"{', '.join(apart[:-1])}{' and ' if apart[1:] else ''}{apart[-1]} {are}, as {one.symbol},"
-        f" the {one.label[0].lower()}{one.label[1:]}: {one.value:.4g}{after_number(one.unit)}"
-        f" to {in_percent(half_width)}."
+        f" the {one.label[0].lower()}{one.label[1:]}: {told}."
     )

@@ -85,6 +85,7 @@ def whiteness_findings(tests: tuple[Whiteness, ...]) -> list[str]:
     named = "; ".join(f"{', '.join(channels)} of run {run}" for run, channels in where.items())
     effective = sum(one.effective_samples for one in tests)
     return [
-        f"The residuals are not noise in {named}: the model misses something there, and the error "
-        f"bars count {effective:.0f} of {sum(one.samples for one in tests)} samples."
+        f"The residuals are not noise in {named}: the model misses something there, or noise of "
+        "the wheels or of a_x comes through the car, and may bias the parameters beyond their "
+        f"error bars; the {sum(one.samples for one in tests)} samples are worth {effective:.0f}."
     ]

@@ -74,7 +74,7 @@ def test_frames_carry_both_ends_of_every_band(engineer, fitted, method):
         "manoeuvre": "bump",
         "duration": 2,
         "channels": ["chassis.z"],
-        "bands": {"identification": fitted["id"], "method": method, "cars": 16},
+        "bands": {"identification": fitted["id"], "method": method, "cars": 39},
     }
     reply = engineer.post("/simulations", json=body)
     assert reply.status_code == 200, reply.text

@@ -11,6 +11,7 @@ from ridetune.engine.fit import Outcome, determined
 from ridetune.engine.fit_file import fit_to_json, write_fit
 from ridetune.engine.identification import Problem, identify
 from ridetune.engine.parameters import PARAMETER_NAMES
+from ridetune.engine.variables import FreeParameter
 from ridetune.engine.vehicle_file import read_vehicle
 
 from .. import stand_in
@@ -197,6 +198,18 @@ def test_the_interval_of_a_parameter_near_its_bound_reaches_back_as_without_it()
     assert held.confidence_interval[1] == np.inf
 
 
+def test_a_bound_far_away_by_its_factor_leaves_a_parameter_as_it_is():
+    """Oracle: the fit between bounds that are near. 100 is twenty times the lower bound, and less
+    than a thousandth of the range away from it."""
+    name = "rear.stabilizer_bar.damping"
+    run = stand_in.recording(CAR, seed=4)
+    near = fit([run], free=[name], start={}).parameters[0]
+    wide = fit([run], free=[name], start={}, bounds={name: (5.0, 1e5)}).parameters[0]
+    assert not wide.at_bound
+    assert wide.determined == "yes"
+    assert wide.confidence_interval == pytest.approx(near.confidence_interval, rel=1e-4)
+
+
 def test_trials_that_fail_are_stepped_around():
     """Oracle: the truth, on the edge of a region of cars that fail."""
     name = PARAMETER_NAMES[0]
@@ -269,7 +282,26 @@ def test_a_fit_with_no_way_on_says_so():
 )
 def test_determined_is_a_matter_of_the_half_width(half_width, at_bound, verdict):
     assert determined(100.0, half_width, at_bound) == verdict
-    assert determined(-100.0, half_width, at_bound) == verdict
+
+
+def test_an_angle_that_is_0_is_determined_as_one_of_0_05_rad():
+    """Oracle: the truth, 0, which lies within the interval; a half-width of a thousandth of a rad
+    would be all of the value and more, and is 2 % of 0.05 rad."""
+    level = CAR.with_values({"front.pivot.angle": 0.0})
+    found = fit([stand_in.recording(level)], free=["front.pivot.angle"], start={})
+    [one] = found.parameters
+    low, high = one.confidence_interval
+    assert low < 0.0 < high
+    assert 0.5 * (high - low) > 0.5 * abs(one.value)
+    assert one.determined == "yes"
+
+
+@pytest.mark.parametrize(
+    ("value", "size"), [(0.0, 0.05), (-0.02, 0.05), (0.05, 0.05), (-0.07, 0.07), (0.3, 0.3)]
+)
+def test_a_small_angle_is_judged_by_0_05_rad(value, size):
+    assert FreeParameter("rear.pivot.angle", 0.1, -0.3, 1.3).size(value) == size
+    assert FreeParameter("rear.pivot.distance", -1.0, -9.0, -0.1).size(-0.2) == 0.2
 
 
 def test_intervals_hold_the_truth_as_often_as_they_say():

@@ -103,6 +103,27 @@ def test_spikes_leave_a_robust_fit_within_its_error_bars(name):
     assert "samples of chassis.z of run lap lie beyond 3 noises" in told[0]
 
 
+@pytest.mark.parametrize(
+    ("name", "rises"),
+    [
+        ("huber", (0.0002, 0.018)),
+        ("soft_l1", (0.004, 0.020)),
+        ("cauchy", (0.014, 0.072)),
+        ("arctan", (0.013, 0.16)),
+    ],
+)
+def test_clean_noise_costs_a_loss_as_much_precision_as_is_told(name, rises):
+    """Oracle: the variance of an M-estimator, E psi^2 / (E psi')^2 (Huber 1981, 3.2), with psi'
+    by Stein's lemma E psi' = E[r psi] / s^2, over normal noise of s = 1 and 2; to two digits."""
+    r = np.linspace(-24.0, 24.0, 48001)
+    psi, _ = Loss(name, 3.0).scores(r)
+    for s, rise in zip((1.0, 2.0), rises, strict=True):
+        density = np.exp(-0.5 * (r / s) ** 2) / (s * np.sqrt(2.0 * np.pi)) * (r[1] - r[0])
+        slope = np.sum(r * psi * density) / s**2
+        found = np.sqrt(np.sum(psi**2 * density)) / slope / s - 1.0
+        assert found == pytest.approx(rise, rel=0.04)
+
+
 def test_errors_of_a_robust_fit_to_clean_noise_are_those_of_least_squares():
     """Oracle: Huber's efficiency at 3 standard deviations, 0.9998 (Huber 1981, exhibit 4.3)."""
     run = stand_in.recording(CAR, seed=3)

@@ -100,6 +100,40 @@ def test_searches_cut_short_lie_in_the_basin_they_are_counted_in(monkeypatch):
         assert one.starts == other.starts
 
 
+def test_minima_that_are_one_with_the_noise_that_is_found_are_told_as_one():
+    """Oracle: the model. z alone has several minima, pitch, 0.02 u sin 3t, but one. With noise of
+    20 um on z and 1 deg on pitch z weighs all; it has 2 mm, and pitch a thousandth of a degree."""
+
+    def simulate(cars, inputs, traction):
+        u = np.log(stand_in.values_of(cars)[SPRING] / CAR.value(SPRING))
+        histories = np.zeros((len(cars), len(inputs.time), 3))
+        histories[:, :, 0] = np.outer(np.cos(4.0 * u), WAVES[0])
+        histories[:, :, 1] = np.outer(0.02 * u, np.sin(3.0 * TIME)) + 0.003 * np.sin(5.0 * TIME)
+        return histories
+
+    rng = np.random.default_rng(0)
+    channels = dict.fromkeys(INPUT_CHANNELS, np.zeros_like(TIME)) | {
+        "chassis.z": WAVES[0] + 2e-3 * rng.normal(size=TIME.size),
+        "chassis.pitch": 0.003 * np.sin(5.0 * TIME) + 2e-5 * rng.normal(size=TIME.size),
+    }
+    wrong = {("lap", "chassis.z"): 2e-5, ("lap", "chassis.pitch"): 2e-2}
+    found = []
+    for quantities in ({}, {"noise": "fit"}):
+        problem = Problem.build(
+            CAR,
+            [Run("lap", TIME, channels)],
+            [SPRING],
+            bounds={SPRING: (0.1 * CAR.value(SPRING), 8.0 * CAR.value(SPRING))},
+            sensors=dict.fromkeys(("chassis.z", "chassis.pitch"), quantities),
+        )
+        found.append(identify(problem.with_noise(wrong), starts=64, simulate=simulate))
+    stated, fitted = found
+    assert len(stated.minima) > 1
+    assert [one.starts for one in fitted.minima] == [REFINED]
+    assert fitted.minima[0].from_start
+    assert not any("inimum" in sentence or "alone" in sentence for sentence in fitted.warnings)
+
+
 def test_a_single_start_has_a_single_minimum():
     found = identify(asked(4.5), simulate=simulate)
     only = found.minima[0]

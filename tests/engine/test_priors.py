@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from ridetune.engine.errors import ParameterError, ProblemError
+from ridetune.engine.fit import Outcome
 from ridetune.engine.identification import Problem, identify
 from ridetune.engine.residuals import Residuals
 
@@ -77,6 +78,21 @@ def test_what_the_runs_say_without_a_prior_is_the_fit_without_it():
     assert "standard errors from its prior" in told
 
 
+def test_what_the_runs_say_without_a_prior_is_not_held_by_a_bound():
+    """Oracle: the normal equations without it, in which the bound, below the truth, plays no
+    part."""
+    priors = {SPRING: (19500.0, 200.0)}
+    named = {"start": {SPRING: 19000.0}, "bounds": {SPRING: (5000.0, 20000.0)}}
+    problem = Problem.build(CAR, [RUN], [SPRING, PIVOT], priors=priors, **named)
+    found = identify(problem, simulate=stand_in.simulate)
+    x, _ = without(problem)
+    check = found.priors[0]
+    assert found.parameters[0].at_bound
+    assert check.without == pytest.approx(problem.free[0].scale * np.exp(x[0]), rel=1e-6)
+    assert check.without == pytest.approx(CAR.value(SPRING), rel=0.01)
+    assert "The runs alone put front.suspension.stiffness at" in " ".join(found.warnings)
+
+
 def test_a_prior_that_agrees_is_not_told_of():
     _, found = fit({PIVOT: (CAR.value(PIVOT), 0.05)})
     assert abs(found.priors[0].apart) < 3.0
@@ -97,6 +113,42 @@ def test_a_prior_determines_what_the_runs_do_not():
     assert found.parameters[0].determined == "yes"
     assert found.priors[0].without is None
     assert found.converged
+
+
+def test_a_prior_far_from_the_start_is_no_reason_to_leave_it():
+    """Oracle: the fit without the prior, whose start carries the car; the prior is right."""
+    start = {SPRING: 0.7 * CAR.value(SPRING)}
+    told = [
+        identify(
+            Problem.build(CAR, [RUN], FREE, start=start, priors=priors), simulate=stand_in.simulate
+        )
+        for priors in ({}, {SPRING: (CAR.value(SPRING), 3.0)})
+    ]
+    assert told[0].warnings == told[1].warnings == ()
+    assert told[1].parameters[0].value == pytest.approx(CAR.value(SPRING), abs=10.0)
+
+
+@pytest.mark.parametrize(("weight", "astray"), [(1.0, False), (1000.0, True)])
+def test_a_fit_is_astray_by_its_runs_not_by_its_priors(weight, astray):
+    """Oracle: the runs' cost, quadratic in ln K, against that of their means. A prior at 5 K that
+    weighs as much as the runs leaves ln K half way, where each has a quarter of what the runs have
+    at 5 K: above what their means have, together, and below it, each. One that weighs much more
+    carries the car away, and the sentence names it."""
+    problem = Problem.build(CAR, [RUN], [SPRING])
+    residuals = Residuals(problem, stand_in.simulate)
+    x = np.array([problem.free[0].variable(CAR.value(SPRING))])
+    at_five = float(residuals.costs([x + np.log(5.0)])[0])
+    assert 0.25 * at_five < residuals.scatter() < 0.5 * at_five < at_five
+    deviation = 5.0 * CAR.value(SPRING) * np.log(5.0) / np.sqrt(2.0 * weight * at_five)
+    priors = {SPRING: (5.0 * CAR.value(SPRING), deviation)}
+    found = identify(Problem.build(CAR, [RUN], [SPRING], priors=priors), simulate=stand_in.simulate)
+    assert (found.outcome == Outcome.ASTRAY) == astray
+    assert "any priors" in Outcome.ASTRAY
+    assert not any("start values do not carry" in sentence for sentence in found.warnings)
+    assert any("The runs alone put" in sentence for sentence in found.warnings)
+    if not astray:
+        middle = np.sqrt(5.0) * CAR.value(SPRING)
+        assert found.parameters[0].value == pytest.approx(middle, rel=0.01)
 
 
 @pytest.mark.parametrize(

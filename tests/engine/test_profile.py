@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from ridetune.engine.errors import Cancelled, ParameterError, ProblemError
 from ridetune.engine.identification import Problem, identify
+from ridetune.engine.loss import Loss
 from ridetune.engine.parameters import PARAMETER_NAMES
 from ridetune.engine.profile import profile
 
@@ -27,6 +28,10 @@ def fitted(simulate=stand_in.simulate, runs=None, **named):
     return fit, Problem.build(CAR, runs, **{**named, "start": start, "bounds": bounds})
 
 
+def interval_of(fit, name):
+    return next(one.confidence_interval for one in fit.parameters if one.name == name)
+
+
 @pytest.mark.parametrize("name", [SPRING, ANGLE])
 def test_where_the_model_is_linear_a_profile_is_the_fit_s_interval(name):
     """Oracle: a quadratic cost, so t is the change of the variable over its standard error. What
@@ -43,6 +48,20 @@ def test_where_the_model_is_linear_a_profile_is_the_fit_s_interval(name):
     assert found.points[0].distance < -found.quantile < found.quantile < found.points[-1].distance
     assert not found.lower_at_bound
     assert not found.upper_at_bound
+
+
+@pytest.mark.parametrize("loss", [Loss("cauchy", 1.0), Loss("arctan", 1.5), Loss("huber", 1.0)])
+def test_a_profile_by_a_loss_is_as_wide_as_the_fit_s_interval(loss):
+    """Oracle: the fit's interval, as the summed cost is a quadratic over so small steps. The fit
+    takes the second derivative by a channel's mean w, the cost has that of each sample; their
+    means over 1000 samples, half of them deep in the bend, differ by sqrt(0.5) / sqrt(1000) = 2 %,
+    their roots by 1 %; twice that."""
+    runs = [stand_in.recording(CAR, seed=4)]
+    named = {"free": [SPRING, "rear.pivot.angle"], "loss": loss}
+    fit, problem = fitted(runs=runs, **named)
+    found = profile(problem, SPRING, simulate=stand_in.simulate)
+    widths = [high - low for low, high in (found.confidence_interval, interval_of(fit, SPRING))]
+    assert widths[0] == pytest.approx(widths[1], rel=0.02)
 
 
 def test_the_others_follow_along_a_valley():
@@ -63,6 +82,43 @@ def test_the_others_follow_along_a_valley():
     for point in found.points:
         assert point.value * point.others[DAMPER] == pytest.approx(product, rel=1e-4)
         assert abs(point.distance) < 0.1
+    assert found.confidence_interval == (-math.inf, math.inf)
+    assert found.lower_at_bound
+    assert found.upper_at_bound
+
+
+def test_a_profile_goes_on_to_where_a_parameter_ends_that_the_runs_hardly_hold():
+    """Oracle: the stand-in, linear in the logarithm, on which the spring acts 4000 times less:
+    the interval is the fit's, whose ends are a factor of more than e^4 from the value, where
+    sixteen quarters of 100 % end, and nearer than the bounds."""
+
+    def simulate(cars, inputs, traction):
+        values = stand_in.values_of(cars)
+        weakly = CAR.value(SPRING) * (values[SPRING] / CAR.value(SPRING)) ** 2.3e-4
+        return stand_in.histories(values | {SPRING: weakly}, inputs)
+
+    bounds = {SPRING: (100.0, 1e7)}
+    runs = [stand_in.recording(CAR, seed=8)]
+    fit, problem = fitted(simulate, runs, free=[SPRING], bounds=bounds)
+    low, high = interval_of(fit, SPRING)
+    value = fit.parameters[0].value
+    assert bounds[SPRING][0] < low < math.exp(-4.0) * value
+    assert math.exp(4.0) * value < high < bounds[SPRING][1]
+    found = profile(problem, SPRING, simulate=simulate)
+    assert np.log(found.confidence_interval) == pytest.approx(np.log([low, high]), abs=0.02)
+
+
+def test_a_profile_of_what_the_runs_do_not_hold_at_all_goes_to_its_bounds():
+    """Oracle: the bounds, factors of 240 and 420 away."""
+
+    def simulate(cars, inputs, traction):
+        values = stand_in.values_of(cars)
+        hardly = CAR.value(SPRING) * (values[SPRING] / CAR.value(SPRING)) ** 1e-5
+        return stand_in.histories(values | {SPRING: hardly}, inputs)
+
+    bounds = {SPRING: (100.0, 1e7)}
+    _, problem = fitted(simulate, free=[SPRING], bounds=bounds)
+    found = profile(problem, SPRING, simulate=simulate)
     assert found.confidence_interval == (-math.inf, math.inf)
     assert found.lower_at_bound
     assert found.upper_at_bound

@@ -265,7 +265,7 @@ def test_marginal_information_gives_the_marginal_errors():
     """Oracle: the errors of all five variables, of which the first two are taken."""
     rng = np.random.default_rng(0)
     slopes, scores = rng.normal(size=(40, 5)), rng.normal(size=(40, 5))
-    whole = Information(triangle(slopes), scores.T @ scores, 40.0, 30.0)
+    whole = Information(triangle(slopes), (scores.T @ scores,), 40.0, (30.0,))
     of_two = whole.marginal([0, 1])
     part, errors = uncertainty(of_two), uncertainty(whole).marginal(2)
     assert_allclose(part.covariance, errors.covariance, rtol=1e-10)
@@ -278,8 +278,8 @@ def test_a_variable_without_effect_takes_nothing_from_the_others():
     rng = np.random.default_rng(0)
     slopes, scores = rng.normal(size=(40, 3)), rng.normal(size=(40, 3))
     slopes[:, 2] = scores[:, 2] = 0.0
-    whole = Information(triangle(slopes), scores.T @ scores, 40.0, 30.0)
-    known = Information(triangle(slopes[:, :2]), scores[:, :2].T @ scores[:, :2], 40.0, 30.0)
+    whole = Information(triangle(slopes), (scores.T @ scores,), 40.0, (30.0,))
+    known = Information(triangle(slopes[:, :2]), (scores[:, :2].T @ scores[:, :2],), 40.0, (30.0,))
     found = uncertainty(whole.marginal([0, 1]))
     assert_allclose(found.covariance, uncertainty(known).covariance, rtol=1e-10)
     assert len(found.unknown) == 0
@@ -411,6 +411,35 @@ def test_what_a_sensor_cannot_be_is_refused_in_one_sentence(sensors, sentence):
     with pytest.raises(ProblemError) as refused:
         Problem.build(stand_in.REFERENCE, [run], sensors=sensors)
     assert sentence in str(refused.value)
+
+
+def test_a_bias_is_not_found_of_a_channel_in_whose_measured_state_the_model_begins(true):
+    settings = RimsSettings(initial_state="measured")
+    fitted = {"chassis.pitch": {"bias": "fit"}}
+    with pytest.raises(ProblemError) as refused:
+        Problem.build(CAR, [true], FOUR, settings=settings, sensors=fitted)
+    assert str(refused.value).startswith("The bias of chassis.pitch is to be fitted, but")
+    assert "begin in equilibrium, or state the bias" in str(refused.value)
+    Problem.build(CAR, [true], FOUR, settings=settings, sensors={"chassis.a_x": {"bias": "fit"}})
+
+
+@pytest.mark.parametrize(
+    ("found", "told"),
+    [
+        ((), "chassis.z reads 20 instead of 0 mm, chassis.pitch reads 1 instead of 0 deg;"),
+        (("chassis.z",), "there chassis.pitch reads 1 instead of 0 deg;"),
+        (("chassis.z", "chassis.pitch"), None),
+        (("wheel.fl.z",), None),
+    ],
+)
+def test_a_rest_value_that_is_to_be_found_is_not_to_be_subtracted(true, found, told):
+    off = {"chassis.z": 0.02, "chassis.pitch": np.radians(1.0)}
+    run = replace(true, channels={k: v + off.get(k, 0.0) for k, v in true.channels.items()})
+    sensors = {name: {"bias": "fit"} for name in found}
+    [seen] = Problem.build(CAR, [run], FOUR, sensors=sensors).runs
+    rests = [one for one in seen.inputs.warnings if "starts at rest" in one]
+    assert len(rests) == (told is not None)
+    assert told is None or told in rests[0]
 
 
 def test_a_bias_behind_a_high_pass_and_a_noise_stated_twice_are_refused():

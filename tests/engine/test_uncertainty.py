@@ -3,6 +3,7 @@ import pytest
 from numpy.testing import assert_allclose
 from ridetune.engine.filters import low_pass
 from ridetune.engine.uncertainty import (
+    Information,
     RunResiduals,
     bandwidth,
     information,
@@ -72,6 +73,30 @@ def test_intervals_take_the_quantile_of_the_windows_they_average():
     assert bandwidth(residuals[np.newaxis], STEP) == 200.0
     assert found.quantile == pytest.approx(student_t.ppf(0.975, 2 * 3 * 4000 / 200))
     assert_allclose(found.half_width, found.quantile * found.std_error)
+
+
+def test_a_run_gives_degrees_of_freedom_as_far_as_the_error_is_its():
+    """Oracle: Satterthwaite's formula. 4 s that tell all have 12 beside 40 s that tell nothing;
+    variances of which two runs have the shares 1/4 and 3/4 have 1 / (1/16 f_1 + 9/16 f_2); known
+    ones, as a prior's, have the normal distribution's quantile."""
+
+    def quantile(*parts):
+        scatters, freedoms = zip(*parts, strict=True)
+        known = Information(
+            np.eye(2), tuple(s * np.eye(2) for s in scatters), 1e9, tuple(map(float, freedoms))
+        )
+        return uncertainty(known).quantile
+
+    assert quantile((1.0, 12), (0.0, 120)) == pytest.approx(student_t.ppf(0.975, 12))
+    both = 1.0 / (1.0 / 16.0 / 12.0 + 9.0 / 16.0 / 120.0)
+    assert quantile((0.5, 12), (1.5, 120)) == pytest.approx(student_t.ppf(0.975, both))
+    assert quantile((1.0, np.inf)) == pytest.approx(1.959964, rel=1e-5)
+    short, silent = regressors(800), np.zeros((8000, 3))
+    rng = np.random.default_rng(5)
+    alone = one_channel(rng.normal(size=800), short)
+    beside = one_channel(rng.normal(size=8000), silent)
+    found = [uncertainty(information(runs)).quantile for runs in ([alone], [alone, beside])]
+    assert found == pytest.approx([student_t.ppf(0.975, 12)] * 2)
 
 
 def test_a_channel_with_misjudged_noise_does_not_spoil_the_errors():

@@ -50,7 +50,7 @@ def test_slow_residuals_are_far_from_white_and_worth_few_samples():
     assert found.samples == 8000
     (sentence,) = whiteness_findings((found,))
     assert sentence.startswith("The residuals are not noise in chassis.z of run lap:")
-    assert f"count {found.effective_samples:.0f} of 8000 samples" in sentence
+    assert f"the 8000 samples are worth {found.effective_samples:.0f}." in sentence
 
 
 def test_filtered_white_noise_is_white_where_the_filter_leaves_it():
@@ -85,6 +85,7 @@ def test_a_fit_tells_of_what_its_model_misses_and_of_nothing_else():
     missed = identify(problem, simulate=drifting)
     assert "not noise in chassis.z of run lap" in " ".join(missed.warnings)
     assert "not noise in chassis.pitch" not in " ".join(missed.warnings)
+    assert "or noise of the wheels or of a_x comes through" in " ".join(missed.warnings)
 
 
 def test_nothing_is_said_of_a_channel_of_little_colour_or_of_rounding():
