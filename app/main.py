@@ -82,6 +82,8 @@ def create_app(
         openapi_url="/api/openapi.json",
         docs_url=None,
         redoc_url=None,
+        # Else a DELETE below something whose name is empty would be sent on to that itself.
+        redirect_slashes=False,
         lifespan=lifespan,
     )
     for part in (

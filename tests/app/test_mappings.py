@@ -228,3 +228,21 @@ def test_a_mapping_that_is_kept_is_proposed_for_the_next_file(visitor, kept):
     assert found["template"] is None
     bad = visitor.post("/mappings", json={"name": "x", "mapping": {"columns": 1}})
     assert bad.status_code == 422
+
+
+@pytest.mark.parametrize("name", [".", "..", "a/b", "a\\b", "../x"])
+def test_a_name_that_an_address_cannot_hold_is_refused(visitor, name):
+    """A browser makes the session's own address of mappings/.. ."""
+    mapping = {"columns": [{"column": "x", "channel": "chassis.z", "unit": "m"}]}
+    reply = visitor.post("/mappings", json={"name": name, "mapping": mapping})
+    assert (reply.status_code, reply.json()["field"]) == (422, "name")
+    assert "give a name without / and \\ that is more than dots" in reply.json()["detail"]
+    assert visitor.get("/mappings").json() == []
+
+
+@pytest.mark.parametrize("path", ["/", "/mappings/"])
+def test_an_address_with_a_slash_too_many_deletes_nothing(visitor, path):
+    """Oracle: what is there afterwards; httpx follows a redirection as a browser does."""
+    reply = visitor.delete(path, follow_redirects=True)
+    assert reply.status_code in (404, 405)
+    assert visitor.get().status_code == 200
