@@ -67,7 +67,7 @@ class Recordings:
         """The parsed recording under the measurement's name and mapping, with its noise;
         `UnmappedError` where it needs a mapping and has none.
         """
-        if measurement.summary.get("needs_mapping"):
+        if measurement.mapping is None and measurement.summary.get("needs_mapping"):
             raise UnmappedError(
                 f"{measurement.name}: its columns are not mapped to channels; map them first."
             )

@@ -80,7 +80,7 @@ def _map(services: Services, sid: str, kept: Measurement, body: JsonObject) -> M
     mapping = mapping_to_json(mapping_from_json(body, "mapping"))
     data = services.store.original(kept).read_bytes()
     noise = dict(services.recordings.parse(data, kept.name, kept.noise, mapping).noise)
-    done = services.recordings.run(replace(kept, mapping=mapping, noise=noise, summary={}))
+    done = services.recordings.run(replace(kept, mapping=mapping, noise=noise))
     found = summary(done, mapping)
     return services.store.set_mapping(sid, kept.id, mapping, noise, found)
 

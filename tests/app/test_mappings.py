@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from ridetune.app.recordings import as_stated, stated
 from ridetune.engine.measurement import read_run
 
 from .conftest import SAMPLES, short_recording
@@ -146,6 +147,18 @@ def test_another_mapping_makes_another_run(visitor, kept):
     np.testing.assert_allclose(second, 2.0 * np.array(first), rtol=1e-6)
     forgotten = visitor.delete(f"{path}/mapping").json()
     assert forgotten == kept
+
+
+def test_a_job_reads_a_recording_as_it_was_mapped_then(visitor, kept):
+    """Its mapping, and what was done to it, are the job's for ever."""
+    path, shared = f"/measurements/{kept['id']}", visitor.client.app.state.services
+    visitor.put(f"{path}/mapping", json=visitor.get(f"{path}/columns").json()["proposed"])
+    mapped = shared.store.measurement(visitor.id, kept["id"])
+    run = shared.recordings.run(mapped)
+    assert visitor.delete(f"{path}/mapping").json()["needs_mapping"] is True
+    now = shared.store.measurement(visitor.id, kept["id"])
+    again = shared.recordings.run(as_stated(now, stated(mapped)))
+    np.testing.assert_array_equal(again["chassis.z"], run["chassis.z"])
 
 
 def test_notes_of_a_file_that_needs_a_mapping_wait_for_it(visitor, kept):
