@@ -21,8 +21,7 @@ from ..engine.run_notes import doubtful_noise
 from .store import Measurement, NewMeasurement, Store
 
 if TYPE_CHECKING:
-    from ..engine.formats.child import Bounds
-    from ..engine.formats.table import Table
+    from ..engine.formats.child import Bounds, ChildTable
     from ..engine.mapping.survey import Survey
     from ..engine.recorded_motion import RecordedMotion
 
@@ -117,12 +116,12 @@ class Recordings:
         return found
 
     @contextmanager
-    def table(self, measurement: Measurement) -> "Iterator[Table]":
+    def table(self, measurement: Measurement) -> "Iterator[ChildTable]":
         """The file as a table, for as long as the `with` lasts."""
-        from ..engine.formats.opening import opened
+        from ..engine.formats.child import ChildTable
 
         path, name = self._store.original(measurement), measurement.name
-        with opened(path, name, apart=True, bounds=self._bounds) as table:
+        with ChildTable(path, name, bounds=self._bounds) as table:
             yield table
 
     def parse(

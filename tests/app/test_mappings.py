@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from ridetune.app.recordings import as_stated, stated
+from ridetune.engine.formats.child import ChildTable
 from ridetune.engine.measurement import read_run
 
 from .conftest import SAMPLES, short_recording
@@ -218,6 +219,18 @@ def test_a_preview_shows_the_file_s_numbers_over_time_in_s(visitor, kept):
     beyond = visitor.get(f"/measurements/{kept['id']}/columns/preview?index=9")
     assert (beyond.status_code, beyond.json()["field"]) == (422, "index")
     assert "they go from 0 to 8" in beyond.json()["detail"]
+
+
+def test_a_preview_of_any_length_asks_for_few_numbers(monkeypatch, visitor, kept):
+    """Oracle: no whole column, and no part of one, leaves the child."""
+
+    def whole(*_):
+        raise AssertionError("the samples themselves were asked for")
+
+    for name in ("values", "part", "in_si"):
+        monkeypatch.setattr(ChildTable, name, whole)
+    shown = visitor.get(f"/measurements/{kept['id']}/columns/preview?index=2&points=40").json()
+    assert len(shown[0]["time"]) == 40
 
 
 def test_a_mapping_that_is_kept_is_proposed_for_the_next_file(visitor, kept):
