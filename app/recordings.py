@@ -167,8 +167,11 @@ class Recordings:
         try:
             run = self.parse(data, name, noise)
         except UnmappedError as error:
-            found = unmapped_summary(self._surveyed(data, name), error)
-            return NewMeasurement(name, data, found, noise or {})
+            from ..engine.plausibility import require_samples
+
+            found = self._surveyed(data, name)
+            require_samples(max((one.samples for one in found.columns), default=0), name)
+            return NewMeasurement(name, data, unmapped_summary(found, error), noise or {})
         return NewMeasurement(name, data, summary(run), dict(run.noise))
 
     def _surveyed(self, data: bytes, name: str) -> "Survey":
