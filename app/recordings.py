@@ -45,6 +45,7 @@ class Recordings:
 
     def __init__(self, store: Store):
         self._store = store
+        self._folder = store.directory.reading
         self._children = threading.BoundedSemaphore(store.limits.readers)
         self._runs: Remembered[Any, Run] = Remembered(REMEMBERED_VALUES)
         self._conditioned: Remembered[Any, Run] = Remembered(REMEMBERED_VALUES)
@@ -143,7 +144,7 @@ class Recordings:
 
         One with names of its own is kept as a file that needs a mapping.
         """
-        with _readable(name), NamedTemporaryFile(prefix="ridetune-") as file:
+        with _readable(name), NamedTemporaryFile(dir=self._folder) as file:
             file.write(data)
             file.flush()
             with self._opened(Path(file.name), name) as table:
@@ -159,7 +160,11 @@ class Recordings:
         """A stranger's file, opened once a child may be started."""
         from ..engine.formats.child import ChildTable
 
-        with _readable(name), self._children, ChildTable(path, name, bounds=self._bounds) as table:
+        with (
+            _readable(name),
+            self._children,
+            ChildTable(path, name, bounds=self._bounds, folder=self._folder) as table,
+        ):
             yield table
 
     @property

@@ -1,5 +1,6 @@
 """Children that read files: how many there are, and who is refused while they are at work."""
 
+import tempfile
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -75,6 +76,17 @@ def test_one_child_reads_for_all_who_want_the_same(client, gate):
         runs = list(pool.map(lambda _: recordings.run(measurement), range(8)))
     assert {run.duration for run in runs} == {kept["duration"]}
     assert gate.started == 1
+
+
+def test_whatever_reading_needs_lies_in_the_data_directory(client, gate, monkeypatch):
+    """Nothing else could be written; and it is gone afterwards."""
+    monkeypatch.setattr(tempfile, "tempdir", "/nowhere")
+    gate.open.set()
+    visitor, folder = Visitor(client), client.app.state.services.store.directory.reading
+    kept = visitor.upload(short_recording().replace(b"time", b"Zeit")).json()
+    assert visitor.get(f"/measurements/{kept['id']}/columns").status_code == 200
+    assert gate.started == 2
+    assert list(folder.iterdir()) == []
 
 
 def test_what_piles_up_is_refused_with_the_time_to_try_again(client, gate):
