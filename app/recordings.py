@@ -79,7 +79,6 @@ class Recordings:
         run = self._runs.made(_key(measurement), lambda: self.parse(measurement), _size)
         return replace(
             run,
-            name=measurement.name,
             noise=measurement.noise,
             warnings=(*run.warnings, *doubtful_noise(measurement.noise, run.channels)),
         )
@@ -225,9 +224,10 @@ def _run(table: "Table", mapping: Mapping[str, Any] | None, noise: Mapping[str, 
     return mapped_run(table, mapping_from_json(mapping), noise, "")
 
 
-def _key(measurement: Measurement) -> tuple[str, str]:
-    """What a parsed recording is made of."""
-    return measurement.sha256, json.dumps(measurement.mapping, sort_keys=True)
+def _key(measurement: Measurement) -> tuple[str, str, str]:
+    """What a parsed recording is made of; its name heads its messages and may tell its kind."""
+    mapping = json.dumps(measurement.mapping, sort_keys=True)
+    return measurement.sha256, measurement.name, mapping
 
 
 def _done_to(measurement: Measurement) -> tuple[Any, ...]:
@@ -236,7 +236,7 @@ def _done_to(measurement: Measurement) -> tuple[Any, ...]:
     if measurement.conditioning is not None:
         text = json.dumps(measurement.conditioning, sort_keys=True)
         done = (text, *sorted(measurement.noise.items()))
-    return *_key(measurement), measurement.name, *done
+    return *_key(measurement), *done
 
 
 def stated(measurement: Measurement) -> dict[str, Any]:

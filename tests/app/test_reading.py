@@ -4,10 +4,12 @@ import tempfile
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import pytest
 from ridetune.app.recordings import Recordings
 from ridetune.app.settings import Limits, Settings
+from ridetune.engine.errors import MeasurementError
 from ridetune.engine.formats import child
 
 from .conftest import Visitor, open_client, short_recording
@@ -108,3 +110,39 @@ def test_what_piles_up_is_refused_with_the_time_to_try_again(client, gate):
         gate.open.set()
         assert [one.result().status_code for one in sent] == [201] * 5
     assert gate.most == 1
+
+
+def test_two_changes_of_one_recording_are_done_one_after_the_other(client, gate):
+    """Oracle: the histories under both, which are what the summary kept with it must be of."""
+    visitor = Visitor(client)
+    gate.open.set()
+    path = f"/measurements/{visitor.upload(short_recording()).json()['id']}"
+    mapping = visitor.get(f"{path}/columns").json()["proposed"]
+    next(one for one in mapping["columns"] if one["channel"] == "chassis.z")["gain"] = 2.0
+    steps = [{"kind": "scale", "channel": "chassis.z", "bias": 0.001}]
+    while gate.came.acquire(blocking=False):
+        pass
+    gate.open.clear()
+    with ThreadPoolExecutor(2) as pool:
+        first = pool.submit(visitor.put, f"{path}/mapping", json=mapping)
+        assert gate.came.acquire(timeout=PATIENCE)
+        second = pool.submit(visitor.put, f"{path}/conditioning", json={"steps": steps})
+        wait_for(client, 2)
+        gate.open.set()
+        assert [first.result().status_code, second.result().status_code] == [200, 200]
+    heights = visitor.get(f"{path}/frames?channels=chassis.z").json()["values"]["chassis.z"]
+    assert max(heights) == pytest.approx(0.007)
+    found = {one["name"]: one for one in visitor.get(path).json()["channels"]}
+    assert found["chassis.z"]["maximum"] == pytest.approx(max(heights))
+
+
+def test_a_file_is_read_again_under_a_name_of_another_kind(client, gate):
+    """The same bytes are a CSV to one name and to another no MAT file."""
+    visitor = Visitor(client)
+    gate.open.set()
+    kept = visitor.upload(short_recording(), "run.csv").json()
+    shared = client.app.state.services
+    measurement = shared.store.measurement(visitor.id, kept["id"])
+    assert shared.recordings.run(measurement).name == "run.csv"
+    with pytest.raises(MeasurementError, match=r"run\.mat: the file is no MAT file"):
+        shared.recordings.run(replace(measurement, name="run.mat"))
