@@ -4,7 +4,6 @@ Imported with the first request, because it brings numba and scipy.
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 from ..engine.advice_file import advisory_to_json
@@ -17,7 +16,7 @@ from .errors import InvalidRequest, OverBudget
 from .excitation import known_manoeuvre
 from .identification_job import UNTOLD, build_problem, done, marked_runs
 from .job_store import Job
-from .recordings import Recordings
+from .recordings import Recordings, as_stated
 from .schemas import AdviceRequest
 from .settings import Limits
 from .store import Store
@@ -57,9 +56,8 @@ def advice(
         )
     fit = done(fitted)
     spec = {**UNTOLD, **fitted.spec, "vehicle": fit["vehicle"], "start": {}}
-    kept = [store.measurement(session, run["id"]) for run in spec["runs"]]
-    stated = [replace(one, noise=run["noise"]) for one, run in zip(kept, spec["runs"], strict=True)]
-    problem = build_problem(spec, marked_runs(spec, stated, recordings)).as_fitted(fit)
+    kept = [as_stated(store.measurement(session, run["id"]), run) for run in spec["runs"]]
+    problem = build_problem(spec, marked_runs(spec, kept, recordings)).as_fitted(fit)
     return advisory_to_json(advise(problem, candidates, planned=request.planned))
 
 

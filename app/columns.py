@@ -8,6 +8,7 @@ from .errors import InvalidRequest
 from .frames import clean
 
 if TYPE_CHECKING:
+    from ..engine.formats.child import ChildTable
     from ..engine.formats.table import Table
     from ..engine.mapping.numbers import Statistics
     from ..engine.mapping.survey import Survey
@@ -62,12 +63,10 @@ def _numbers(known: "Statistics | None") -> dict[str, Any]:
     }
 
 
-def preview(table: "Table", indices: Iterable[int], points: int) -> list[dict[str, Any]]:
+def preview(table: "ChildTable", indices: Iterable[int], points: int) -> list[dict[str, Any]]:
     """Least and greatest value of some columns, in the file's numbers, over at most so many
-    stretches.
+    stretches. The child looks at the numbers; few of them come back.
     """
-    from ..engine.formats.envelope import envelope
-
     shown = []
     for index in indices:
         if not 0 <= index < len(table.columns):
@@ -75,7 +74,7 @@ def preview(table: "Table", indices: Iterable[int], points: int) -> list[dict[st
                 f"There is no column {index}; they go from 0 to {len(table.columns) - 1}.",
                 field="index",
             )
-        seen, (unit, factor) = envelope(table, index, points), _clock_unit(table, index)
+        seen, (unit, factor) = table.envelope(index, points), _clock_unit(table, index)
         shown.append(
             {
                 "index": index,

@@ -3,6 +3,7 @@
     owner.lock          locked while a service runs; says which process that is
     ridetune.sqlite     the database
     originals/ab/...    uploads, byte for byte, and what jobs made, each under its SHA-256
+    reading/            uploads that a child reads, and the folders that children work in
     dask/               scratch space of the job workers
 
 An original is written beside its place, flushed, renamed and the folder flushed, so that after a
@@ -13,6 +14,7 @@ ended.
 import fcntl
 import hashlib
 import os
+import shutil
 from collections.abc import Collection
 from pathlib import Path
 
@@ -59,6 +61,11 @@ class DataDirectory:
         """Place for the job workers' temporary files."""
         return self.path / "dask"
 
+    @property
+    def reading(self) -> Path:
+        """Place for what is needed while a file is read."""
+        return self.path / "reading"
+
     def original(self, sha256: str) -> Path:
         """Place of an original."""
         return self.originals / sha256[:2] / sha256
@@ -85,7 +92,11 @@ class DataDirectory:
         self.original(sha256).unlink(missing_ok=True)
 
     def sweep(self, kept: Collection[str]) -> None:
-        """Remove what a crash left behind: half-written files and originals without a row."""
+        """Remove what a crash left behind: half-written files, originals without a row, and what
+        was being read.
+        """
+        shutil.rmtree(self.reading, ignore_errors=True)
+        self.reading.mkdir(exist_ok=True)
         for file in self.originals.glob("*/*"):
             if file.name not in kept:
                 file.unlink(missing_ok=True)

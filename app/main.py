@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import logging
+import os
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from importlib.metadata import version
@@ -32,15 +33,15 @@ from .cluster import Cluster
 from .guard import Guard
 from .identification_job import KIND as IDENTIFICATION
 from .identification_job import identify_runs, of_recordings
-from .interactive import Interactive
 from .jobs import Jobs
 from .package_files import package_folder
+from .pool import Pool
 from .problems import reply_to_errors
 from .profile_job import KIND as PROFILE
 from .profile_job import profile_parameter
 from .recordings import Recordings
 from .services import Services, Viewers
-from .settings import Settings
+from .settings import Limits, Settings
 from .store import Store
 from .sweep_job import KIND as SWEEP
 from .sweep_job import sweep
@@ -82,6 +83,8 @@ def create_app(
         openapi_url="/api/openapi.json",
         docs_url=None,
         redoc_url=None,
+        # Else a DELETE below something whose name is empty would be sent on to that itself.
+        redirect_slashes=False,
         lifespan=lifespan,
     )
     for part in (
@@ -120,8 +123,8 @@ def _services(
         settings=settings,
         store=store,
         recordings=recordings,
-        interactive=Interactive(settings.limits),
-        parsing=asyncio.Semaphore(1),
+        interactive=interactive(settings.limits),
+        readers=readers(settings.limits),
         jobs=Jobs(
             store,
             Cluster(settings.cluster, store.directory.scratch),
@@ -139,6 +142,32 @@ def _services(
     )
 
 
+def interactive(limits: Limits) -> Pool:
+    """As wide as the cores: a wider one would not compute faster, it would only take the event
+    loop's share of Python's lock.
+    """
+    share = limits.session_simulations
+    return Pool(
+        "simulations",
+        os.cpu_count() or 1,
+        share=share,
+        most=limits.waiting_simulations,
+        at_once=share,
+    )
+
+
+def readers(limits: Limits) -> Pool:
+    """One file of a session at a time, so that one that sends many keeps nobody else waiting."""
+    return Pool(
+        "files to read",
+        limits.readers,
+        share=limits.session_readings,
+        most=limits.waiting_readings,
+        at_once=1,
+        retry_after=5,
+    )
+
+
 def _viewers() -> Viewers | None:
     if not find_spec(".viewer", __package__):
         return None
@@ -150,6 +179,7 @@ def _viewers() -> Viewers | None:
 def _close(services: Services) -> None:
     services.warmup.close()
     services.interactive.close()
+    services.readers.close()
     services.jobs.close()
     if services.viewers is not None:
         services.viewers.close()

@@ -2,13 +2,17 @@
 
 The original on disk stays the truth; a run here can always be read again from it under its mapping,
 and the motion that it prescribes to every car made again. A file whose columns have names of their
-own is kept, too, and is no run until it has a mapping.
+own is kept, too, and is no run until it has a mapping. Whoever reads a file here waits until a
+child may be started, so that there are never more of them than the settings allow.
 """
 
 import json
+import threading
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, replace
+from pathlib import Path
+from tempfile import NamedTemporaryFile
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,7 +25,7 @@ from ..engine.run_notes import doubtful_noise
 from .store import Measurement, NewMeasurement, Store
 
 if TYPE_CHECKING:
-    from ..engine.formats.child import Bounds
+    from ..engine.formats.child import Bounds, ChildTable
     from ..engine.formats.table import Table
     from ..engine.mapping.survey import Survey
     from ..engine.recorded_motion import RecordedMotion
@@ -41,6 +45,8 @@ class Recordings:
 
     def __init__(self, store: Store):
         self._store = store
+        self._folder = store.directory.reading
+        self._children = threading.BoundedSemaphore(store.limits.readers)
         self._runs: Remembered[Any, Run] = Remembered(REMEMBERED_VALUES)
         self._conditioned: Remembered[Any, Run] = Remembered(REMEMBERED_VALUES)
         self._surveys: Remembered[Any, Survey] = Remembered(REMEMBERED_COLUMNS)
@@ -54,35 +60,35 @@ class Recordings:
         from ..engine.conditioning.chain import condition, steps_from_json
         from ..engine.vehicle_file import vehicle_from_json
 
-        key = _done_to(measurement)
-        run = self._conditioned.get(key)
-        if run is None:
-            asked = measurement.conditioning
+        asked = measurement.conditioning
+
+        def conditioned() -> Run:
             vehicle = asked["vehicle"] and vehicle_from_json(asked["vehicle"])
-            run = condition(self.raw(measurement), steps_from_json(asked["steps"]), vehicle)
-            self._conditioned.keep(key, run, run.time.size * (1 + len(run.columns)))
-        return run
+            return condition(self.raw(measurement), steps_from_json(asked["steps"]), vehicle)
+
+        return self._conditioned.made(_done_to(measurement), conditioned, _size)
 
     def raw(self, measurement: Measurement) -> Run:
         """The parsed recording under the measurement's name and mapping, with its noise;
         `UnmappedError` where it needs a mapping and has none.
         """
-        if measurement.summary.get("needs_mapping"):
+        if measurement.mapping is None and measurement.summary.get("needs_mapping"):
             raise UnmappedError(
                 f"{measurement.name}: its columns are not mapped to channels; map them first."
             )
-        key = _key(measurement)
-        run = self._runs.get(key)
-        if run is None:
-            data = self._store.original(measurement).read_bytes()
-            run = self.parse(data, measurement.name, mapping=measurement.mapping)
-            self._runs.keep(key, run, len(run.time) * (1 + len(run.columns)))
+        run = self._runs.made(_key(measurement), lambda: self.parse(measurement), _size)
         return replace(
             run,
-            name=measurement.name,
             noise=measurement.noise,
             warnings=(*run.warnings, *doubtful_noise(measurement.noise, run.channels)),
         )
+
+    def remembers(self, measurement: Measurement) -> bool:
+        """Whether `run` gives the recording from memory, without a child."""
+        done = None
+        if measurement.conditioning is not None:
+            done = self._conditioned.get(_done_to(measurement))
+        return done is not None or self._runs.get(_key(measurement)) is not None
 
     def motion(
         self,
@@ -99,85 +105,66 @@ class Recordings:
         from ..engine.recorded_motion import recorded_motion
 
         run = with_braking(self.run(measurement), braking)
-        key = _done_to(measurement), settings
-        motion = self._motions.get(key)
-        if motion is None:
-            motion = recorded_motion(run, settings)
-            self._motions.keep(key, motion, motion.stage_inputs.size)
+        motion = self._motions.made(
+            (_done_to(measurement), settings),
+            lambda: recorded_motion(run, settings),
+            lambda made: made.stage_inputs.size,
+        )
         return replace(motion, run=run)
 
     def survey(self, measurement: Measurement) -> "Survey":
         """What is in the file, whether it has a mapping or not."""
+        from ..engine.mapping.survey import survey
+
+        def surveyed() -> "Survey":
+            with self.table(measurement) as table:
+                return survey(table)
+
         key = measurement.sha256, measurement.name
-        found = self._surveys.get(key)
-        if found is None:
-            data = self._store.original(measurement).read_bytes()
-            found = self._surveyed(data, measurement.name)
-            self._surveys.keep(key, found, len(found.columns))
-        return found
+        return self._surveys.made(key, surveyed, lambda made: len(made.columns))
 
-    @contextmanager
-    def table(self, measurement: Measurement) -> "Iterator[Table]":
+    def table(self, measurement: Measurement) -> "AbstractContextManager[ChildTable]":
         """The file as a table, for as long as the `with` lasts."""
-        from ..engine.formats.opening import opened
+        return self._opened(self._store.original(measurement), measurement.name)
 
-        path, name = self._store.original(measurement), measurement.name
-        with opened(path, name, apart=True, bounds=self._bounds) as table:
-            yield table
-
-    def parse(
-        self,
-        data: bytes,
-        name: str,
-        noise: Mapping[str, float] | None = None,
-        mapping: Mapping[str, Any] | None = None,
-    ) -> Run:
-        """Read a measurement file; MeasurementError says what is wrong with it and where.
+    def parse(self, measurement: Measurement, noise: Mapping[str, float] | None = None) -> Run:
+        """Read a measurement's file under its mapping; MeasurementError says what is wrong with it
+        and where.
 
         noise : standard deviations in SI by channel, which are stated beside the file
-        mapping : as JSON, which columns are which channels; None for those with our names
         """
-        from ..engine.measurement import parse_run
-
-        try:
-            if mapping is None:
-                return parse_run(data, name, noise=noise, apart=True, bounds=self._bounds)
-            # The mapping brings scipy.
-            from ..engine.mapping.mapping import mapping_from_json
-            from ..engine.mapping.reading import parse_recording
-
-            known = mapping_from_json(mapping)
-            return parse_recording(data, name, known, noise=noise, bounds=self._bounds)
-        except (RecursionError, MemoryError, OverflowError) as error:
-            raise MeasurementError(
-                f"{name}: the file is too large or too deep to read ({type(error).__name__}); "
-                "send a plain CSV."
-            ) from None
-        except OSError as error:
-            raise MeasurementError(
-                f"{name}: there is no room to read the file ({error.strerror}); try again later."
-            ) from error
+        with self.table(measurement) as table:
+            return _run(table, measurement.mapping, noise or {})
 
     def recorded(
         self, data: bytes, name: str, noise: Mapping[str, float] | None = None
     ) -> NewMeasurement:
-        """A measurement file as it is kept; arguments and errors as of `parse`.
+        """A measurement file as it is kept; `noise` and errors as of `parse`.
 
         One with names of its own is kept as a file that needs a mapping.
         """
-        try:
-            run = self.parse(data, name, noise)
-        except UnmappedError as error:
-            found = unmapped_summary(self._surveyed(data, name), error)
-            return NewMeasurement(name, data, found, noise or {})
-        return NewMeasurement(name, data, summary(run), dict(run.noise))
+        with _readable(name), NamedTemporaryFile(dir=self._folder) as file:
+            file.write(data)
+            file.flush()
+            with self._opened(Path(file.name), name) as table:
+                return NewMeasurement(name, data, *_by_names(table, noise or {}))
 
-    def _surveyed(self, data: bytes, name: str) -> "Survey":
-        from ..engine.formats.opening import opened_bytes
-        from ..engine.mapping.survey import survey
+    def by_names(self, measurement: Measurement) -> tuple[dict[str, Any], dict[str, float]]:
+        """Summary and noise of a measurement's file as if it had just been sent."""
+        with self.table(measurement) as table:
+            return _by_names(table, measurement.noise)
 
-        with opened_bytes(data, name, apart=True, bounds=self._bounds) as table:
-            return survey(table)
+    @contextmanager
+    def _opened(self, path: Path, name: str) -> "Iterator[ChildTable]":
+        """A stranger's file, opened once a child may be started."""
+        from ..engine.formats.child import ChildTable
+
+        with (
+            _readable(name),
+            self._children,
+            ChildTable(path, name, bounds=self._bounds, folder=self._folder) as table,
+        ):
+            yield table
 
     @property
     def _bounds(self) -> "Bounds":
@@ -189,9 +176,58 @@ class Recordings:
         return Bounds(memory=limits.reader_bytes, cpu=seconds, wall=ANSWER * seconds)
 
 
-def _key(measurement: Measurement) -> tuple[str, str]:
-    """What a parsed recording is made of."""
-    return measurement.sha256, json.dumps(measurement.mapping, sort_keys=True)
+@contextmanager
+def _readable(name: str) -> Iterator[None]:
+    """A sentence in place of what else may happen to a file while it is read."""
+    try:
+        yield
+    except (RecursionError, MemoryError, OverflowError) as error:
+        raise MeasurementError(
+            f"{name}: the file is too large or too deep to read ({type(error).__name__}); "
+            "send a plain CSV."
+        ) from None
+    except OSError as error:
+        raise MeasurementError(
+            f"{name}: there is no room to read the file ({error.strerror}); try again later."
+        ) from error
+
+
+def _by_names(
+    table: "Table", noise: Mapping[str, float]
+) -> tuple[dict[str, Any], dict[str, float]]:
+    """Summary and noise of a file without a mapping, whether it needs one or not."""
+    try:
+        run = _run(table, None, noise)
+    except UnmappedError as error:
+        return _unmapped_summary(table, error), dict(noise)
+    return summary(run), dict(run.noise)
+
+
+def _size(run: Run) -> int:
+    """Numbers in a run."""
+    return run.time.size * (1 + len(run.columns))
+
+
+def _run(table: "Table", mapping: Mapping[str, Any] | None, noise: Mapping[str, float]) -> Run:
+    """The run in a table.
+
+    mapping : as JSON, which columns are which channels; None for those with our names
+    """
+    from ..engine.measurement import named_run
+
+    if mapping is None:
+        return named_run(table, noise, "")
+    # The mapping brings scipy.
+    from ..engine.mapping.mapping import mapping_from_json
+    from ..engine.mapping.reading import mapped_run
+
+    return mapped_run(table, mapping_from_json(mapping), noise, "")
+
+
+def _key(measurement: Measurement) -> tuple[str, str, str]:
+    """What a parsed recording is made of; its name heads its messages and may tell its kind."""
+    mapping = json.dumps(measurement.mapping, sort_keys=True)
+    return measurement.sha256, measurement.name, mapping
 
 
 def _done_to(measurement: Measurement) -> tuple[Any, ...]:
@@ -200,7 +236,7 @@ def _done_to(measurement: Measurement) -> tuple[Any, ...]:
     if measurement.conditioning is not None:
         text = json.dumps(measurement.conditioning, sort_keys=True)
         done = (text, *sorted(measurement.noise.items()))
-    return *_key(measurement), measurement.name, *done
+    return *_key(measurement), *done
 
 
 def stated(measurement: Measurement) -> dict[str, Any]:
@@ -258,15 +294,20 @@ def summary(run: Run, mapping: Mapping[str, Any] | None = None) -> dict[str, Any
     }
 
 
-def unmapped_summary(found: "Survey", reason: MeasurementError) -> dict[str, Any]:
+def _unmapped_summary(table: "Table", reason: MeasurementError) -> dict[str, Any]:
     """The same of a file that needs a mapping: what is missing is missing in the guess, too."""
+    from ..engine.mapping.survey import survey
     from ..engine.measurement import missing_for_identification
+    from ..engine.plausibility import require_samples
 
+    found = survey(table)
+    samples = max((one.samples for one in found.columns), default=0)
+    require_samples(samples, found.source)
     nothing = np.arange(2.0)
     guessed = {one.channel: nothing for one in found.guess.mapping.columns if one.channel != "time"}
     return {
         "needs_mapping": True,
-        "samples": max(one.samples for one in found.columns),
+        "samples": samples,
         "duration": 0.0,
         "sample_step": 0.0,
         "channels": [],

@@ -8,7 +8,6 @@ from typing import Any
 from zipfile import ZipFile
 
 from fastapi.responses import FileResponse, Response
-from starlette.concurrency import run_in_threadpool
 
 from ..engine.run_notes import parse_notes
 from .access import SessionId
@@ -94,8 +93,7 @@ def archive(sid: SessionId, jid: str, services: Shared) -> FileResponse:
 @router.post("/{jid}/measurements", status_code=201)
 async def take_over(sid: SessionId, jid: str, services: Shared) -> list[dict[str, Any]]:
     """Make the whole recordings the session's measurements, those that it does not hold yet."""
-    async with services.parsing:
-        kept = await run_in_threadpool(_taken, services, sid, jid)
+    kept = await services.readers.run(sid, lambda: _taken(services, sid, jid))
     return [measurement_to_json(one) for one in kept]
 
 
@@ -117,9 +115,8 @@ def _recorded(services: Services, job: Job, recording: Mapping[str, Any]) -> New
     """A whole recording with the noise that its notes state, and what was driven."""
     name = f"{recording['name']}.toml"
     noise = parse_notes(_read(services, job, name), name).noise
-    new = services.recordings.recorded(
-        _read(services, job, recording["file"]), recording["file"], noise
-    )
+    data = _read(services, job, recording["file"])
+    new = services.recordings.recorded(data, recording["file"], noise)
     driven = json.loads(_read(services, job, f"{recording['name']}.manoeuvre.json"))
     return replace(new, manoeuvre=driven)
 

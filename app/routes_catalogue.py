@@ -158,10 +158,9 @@ async def sensors(services: Shared, received: Sensors) -> dict[str, Any]:
     """A file of sensors, TOML or JSON, checked: `sensors` as a campaign takes them, the channels
     that they record, and the samples a second.
     """
-    async with services.parsing:
-        return await run_in_threadpool(
-            _sensors, received.read(services.settings.limits.body_bytes), received.name
-        )
+    return await run_in_threadpool(
+        _sensors, received.read(services.settings.limits.body_bytes), received.name
+    )
 
 
 def _sensors(data: bytes, name: str) -> dict[str, Any]:

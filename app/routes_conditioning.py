@@ -4,7 +4,6 @@ from dataclasses import replace
 from typing import Any
 
 from fastapi import APIRouter
-from starlette.concurrency import run_in_threadpool
 
 from .access import SessionId
 from .recordings import summary
@@ -24,9 +23,9 @@ router = APIRouter(
 @router.get("")
 async def conditioning(sid: SessionId, mid: str, services: Shared) -> dict[str, Any]:
     """The steps in force, what each of them did, and those that the recording calls for."""
-    kept = services.store.measurement(sid, mid)
-    async with services.parsing:
-        return await run_in_threadpool(_shown, services, sid, kept)
+    return await services.readers.run(
+        sid, lambda: _shown(services, sid, services.store.measurement(sid, mid))
+    )
 
 
 @router.put("")
@@ -34,18 +33,15 @@ async def set_conditioning(
     sid: SessionId, mid: str, services: Shared, body: ConditioningRequest
 ) -> dict[str, Any]:
     """Do these steps to the recording; the original stays, and so does what jobs were given."""
-    kept = services.store.measurement(sid, mid)
-    async with services.parsing:
-        return await run_in_threadpool(_condition, services, sid, kept, body)
+    return await services.readers.run(sid, lambda: _condition(services, sid, mid, body))
 
 
-def _condition(
-    services: Services, sid: str, kept: Measurement, body: ConditioningRequest
-) -> dict[str, Any]:
+def _condition(services: Services, sid: str, mid: str, body: ConditioningRequest) -> dict[str, Any]:
     # They bring scipy, which is loaded with the first simulation.
     from ..engine.conditioning.chain import needs_vehicle, steps_from_json, steps_to_json
     from ..engine.vehicle_file import vehicle_from_json, vehicle_to_json
 
+    kept = services.store.measurement(sid, mid)
     steps = steps_from_json(body.steps)
     asked = None
     if steps:

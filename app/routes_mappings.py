@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Query
-from starlette.concurrency import run_in_threadpool
 
 from .access import SessionId
 from .columns import columns_to_json, preview
@@ -28,14 +27,13 @@ MappingBody = Annotated[JsonObject, Body(description="Columns as channels, see d
 @router.get("/measurements/{mid}/columns")
 async def columns(sid: SessionId, mid: str, services: Shared) -> dict[str, Any]:
     """The file's columns, what each may be and why, and a mapping to begin with."""
-    kept = services.store.measurement(sid, mid)
-    async with services.parsing:
-        return await run_in_threadpool(_columns, services, sid, kept)
+    return await services.readers.run(sid, lambda: _columns(services, sid, mid))
 
 
-def _columns(services: Services, sid: str, kept: Measurement) -> dict[str, Any]:
+def _columns(services: Services, sid: str, mid: str) -> dict[str, Any]:
     from ..engine.mapping.mapping import mapping_from_json
 
+    kept = services.store.measurement(sid, mid)
     templates = {
         name: mapping_from_json(one, name)
         for name, one in services.store.mappings.of_session(sid).items()
@@ -59,8 +57,7 @@ async def columns_preview(
         with services.recordings.table(kept) as table:
             return preview(table, index, points)
 
-    async with services.parsing:
-        return await run_in_threadpool(shown)
+    return await services.readers.run(sid, shown)
 
 
 @router.put("/measurements/{mid}/mapping")
@@ -68,39 +65,36 @@ async def set_mapping(
     sid: SessionId, mid: str, services: Shared, body: MappingBody
 ) -> dict[str, Any]:
     """Take a file's columns for channels; refused while a job reads it."""
-    services.store.require_unused(sid, mid)
-    kept = services.store.measurement(sid, mid)
-    async with services.parsing:
-        return measurement_to_json(await run_in_threadpool(_map, services, sid, kept, body))
+    mapped = await services.readers.run(sid, lambda: _map(services, sid, mid, body))
+    return measurement_to_json(mapped)
 
 
-def _map(services: Services, sid: str, kept: Measurement, body: JsonObject) -> Measurement:
+def _map(services: Services, sid: str, mid: str, body: JsonObject) -> Measurement:
     from ..engine.mapping.mapping import mapping_from_json, mapping_to_json
 
+    services.store.require_unused(sid, mid)
+    kept = services.store.measurement(sid, mid)
     mapping = mapping_to_json(mapping_from_json(body, "mapping"))
-    data = services.store.original(kept).read_bytes()
-    noise = dict(services.recordings.parse(data, kept.name, kept.noise, mapping).noise)
-    done = services.recordings.run(replace(kept, mapping=mapping, noise=noise, summary={}))
-    found = summary(done, mapping)
+    mapped = replace(kept, mapping=mapping)
+    noise = dict(services.recordings.parse(mapped, kept.noise).noise)
+    found = summary(services.recordings.run(replace(mapped, noise=noise)), mapping)
     return services.store.set_mapping(sid, kept.id, mapping, noise, found)
 
 
 @router.delete("/measurements/{mid}/mapping")
 async def forget_mapping(sid: SessionId, mid: str, services: Shared) -> dict[str, Any]:
     """Go by the names of the file's columns again."""
-    services.store.require_unused(sid, mid)
-    kept = services.store.measurement(sid, mid)
 
     def by_names() -> Measurement:
-        data = services.store.original(kept).read_bytes()
-        found = services.recordings.recorded(data, kept.name, kept.noise)
-        bare = replace(kept, mapping=None, noise=found.noise, summary=found.summary)
-        unmapped = found.summary["needs_mapping"]
-        known = found.summary if unmapped else summary(services.recordings.run(bare))
-        return services.store.set_mapping(sid, kept.id, None, found.noise, known)
+        services.store.require_unused(sid, mid)
+        kept = services.store.measurement(sid, mid)
+        found, noise = services.recordings.by_names(kept)
+        if not found["needs_mapping"]:
+            bare = replace(kept, mapping=None, noise=noise, summary=found)
+            found = summary(services.recordings.run(bare))
+        return services.store.set_mapping(sid, kept.id, None, noise, found)
 
-    async with services.parsing:
-        return measurement_to_json(await run_in_threadpool(by_names))
+    return measurement_to_json(await services.readers.run(sid, by_names))
 
 
 @router.get("/mappings")

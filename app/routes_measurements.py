@@ -52,8 +52,7 @@ def measurement_to_json(kept: Measurement) -> dict[str, Any]:
 @router.post("", status_code=201, openapi_extra=openapi("text/csv", "application/octet-stream"))
 async def upload(sid: SessionId, services: Shared, received: Recording) -> dict[str, Any]:
     """Upload a recording of any kind: a form with the part `file`, or the bare file with ?name=."""
-    async with services.parsing:
-        kept = await run_in_threadpool(_keep, services, sid, received)
+    kept = await services.readers.run(sid, lambda: _keep(services, sid, received))
     return measurement_to_json(kept)
 
 
@@ -75,7 +74,7 @@ def one(sid: SessionId, mid: str, services: Shared) -> dict[str, Any]:
 
 
 @router.get("/{mid}/frames", responses=FORMS, response_class=Response)
-def histories(
+async def histories(
     sid: SessionId,
     mid: str,
     services: Shared,
@@ -91,14 +90,23 @@ def histories(
 ) -> Response:
     """The recording's histories in SI: binary, JSON or CSV."""
     form = frames.form_of(request.headers.get("accept"))
-    kept = services.store.measurement(sid, mid)
-    run = services.recordings.run(kept) if conditioned else services.recordings.raw(kept)
-    if form == "csv":
-        return csv_reply(run)
     names = None if channels is None else [name for name in channels.split(",") if name]
-    taken = frames.take(run, names, max_samples, decimate)
-    head = {"mode": "measured", "name": run.name, "duration": run.duration}
-    return frames_reply({**head, "warnings": list(run.warnings)}, taken, form)
+    kept = services.store.measurement(sid, mid)
+    if not conditioned:
+        kept = replace(kept, conditioning=None)
+
+    def shown() -> Response:
+        run = services.recordings.run(kept)
+        if form == "csv":
+            return csv_reply(run)
+        taken = frames.take(run, names, max_samples, decimate)
+        head = {"mode": "measured", "name": run.name, "duration": run.duration}
+        return frames_reply({**head, "warnings": list(run.warnings)}, taken, form)
+
+    # What is in memory need not wait for those who read files.
+    if services.recordings.remembers(kept):
+        return await run_in_threadpool(shown)
+    return await services.readers.run(sid, shown)
 
 
 @router.get("/{mid}/original", response_class=FileResponse)
@@ -115,13 +123,12 @@ def original(sid: SessionId, mid: str, services: Shared) -> FileResponse:
 @router.put("/{mid}/notes", openapi_extra=openapi("application/toml"))
 async def set_notes(sid: SessionId, mid: str, services: Shared, received: Notes) -> dict[str, Any]:
     """Take a recording's noise from a NAME.toml, as the file beside it would state it."""
-    kept = services.store.measurement(sid, mid)
-    async with services.parsing:
-        noted = await run_in_threadpool(_note, services, sid, kept, received)
+    noted = await services.readers.run(sid, lambda: _note(services, sid, mid, received))
     return measurement_to_json(noted)
 
 
-def _note(services: Services, sid: str, kept: Measurement, received: Upload) -> Measurement:
+def _note(services: Services, sid: str, mid: str, received: Upload) -> Measurement:
+    kept = services.store.measurement(sid, mid)
     data = received.read(services.settings.limits.body_bytes)
     noise = dict(parse_notes(data, received.name).noise)
     if not noise.keys() & set(OUTPUT_CHANNELS):
@@ -131,8 +138,7 @@ def _note(services: Services, sid: str, kept: Measurement, received: Upload) -> 
         )
     if kept.summary.get("needs_mapping"):
         return services.store.set_noise(sid, kept.id, noise, kept.summary)
-    data = services.store.original(kept).read_bytes()
-    known = dict(services.recordings.parse(data, kept.name, noise, kept.mapping).noise)
+    known = dict(services.recordings.parse(kept, noise).noise)
     found = summary(services.recordings.run(replace(kept, noise=known)), kept.mapping)
     return services.store.set_noise(sid, kept.id, known, found)
 
@@ -143,8 +149,7 @@ async def set_manoeuvre(
 ) -> dict[str, Any]:
     """Take what was driven from a manoeuvre file, as the NAME.manoeuvre.json beside it."""
     services.store.measurement(sid, mid)
-    async with services.parsing:
-        driven = await run_in_threadpool(_driven, services, received)
+    driven = await run_in_threadpool(_driven, services, received)
     return measurement_to_json(services.store.set_manoeuvre(sid, mid, driven))
 
 

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -68,7 +69,15 @@ def _keys_or_object(value: Any) -> Any:
     return value
 
 
+def _part_of_path(value: str) -> str:
+    """A name that is one part of an address, however a browser shortens that."""
+    if "/" in value or "\\" in value or not value.strip("."):
+        raise PydanticCustomError("name", "give a name without / and \\ that is more than dots")
+    return value
+
+
 KeyOrObject = Annotated[str | JsonObject, BeforeValidator(_key_or_object)]
+PathName = Annotated[Name, AfterValidator(_part_of_path)]
 
 
 class WireForm(BaseModel):
@@ -269,7 +278,7 @@ class ConditioningRequest(WireForm):
 class NamedMapping(WireForm):
     """A mapping to be kept for the next files whose columns are the same."""
 
-    name: Name
+    name: PathName
     mapping: JsonObject
 
 

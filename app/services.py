@@ -1,6 +1,5 @@
 """What the handlers share, made once per service and found at `app.state.services`."""
 
-import asyncio
 from dataclasses import dataclass
 from typing import Annotated, Any, Protocol, cast
 
@@ -8,8 +7,8 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 from ..engine.vehicle import Vehicle
-from .interactive import Interactive
 from .jobs import Jobs
+from .pool import Pool
 from .recordings import Recordings
 from .settings import Settings
 from .store import Store
@@ -34,13 +33,17 @@ class Viewers(Protocol):
 
 @dataclass(frozen=True)
 class Services:
-    """One running service."""
+    """One running service.
+
+    interactive : for what a person waits for and takes a core
+    readers : for what opens files in children
+    """
 
     settings: Settings
     store: Store
     recordings: Recordings
-    interactive: Interactive
-    parsing: asyncio.Semaphore
+    interactive: Pool
+    readers: Pool
     jobs: Jobs
     warmup: WarmUp
     viewers: Viewers | None = None

@@ -36,6 +36,9 @@ class Limits:
     unfinished_jobs: int = 4
     session_simulations: int = 4
     waiting_simulations: int = 64
+    readers: int = 2
+    session_readings: int = 16
+    waiting_readings: int = 64
     simulated_seconds: float = 600.0
     simulated_steps: int = 400_000
     banded_steps: int = 2_000_000

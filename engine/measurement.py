@@ -72,7 +72,7 @@ def read_run(path: str | Path, *, noise: Mapping[str, float] | None = None) -> R
     notes = read_notes(beside) if beside.is_file() else RunNotes()
     try:
         with opened(path, path.name) as table:
-            run = _run(table, {**notes.noise, **(noise or {})}, notes.description)
+            run = named_run(table, {**notes.noise, **(noise or {})}, notes.description)
             return replace(run, conditioning=notes.conditioning)
     except OSError as error:
         raise MeasurementError(
@@ -94,7 +94,7 @@ def parse_run(
     bounds : what the child may take
     """
     with opened_bytes(data, name, apart=apart, bounds=bounds) as table:
-        return _run(table, noise or {}, "")
+        return named_run(table, noise or {}, "")
 
 
 def write_run(run: Run, path: str | Path) -> None:
@@ -130,7 +130,7 @@ def missing_for_identification(run: Run) -> tuple[str, ...]:
     return tuple(missing)
 
 
-def _run(table: Table, noise: Mapping[str, float], description: str) -> Run:
+def named_run(table: Table, noise: Mapping[str, float], description: str) -> Run:
     """The run in a table whose titles are our channels' names."""
     chosen, warnings = _columns(table)
     if table.kind == CSV:

@@ -2,7 +2,8 @@
 
 import threading
 from collections import OrderedDict
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
+from concurrent.futures import Future
 from typing import Generic, TypeVar
 
 Key = TypeVar("Key", bound=Hashable)
@@ -15,6 +16,7 @@ class Remembered(Generic[Key, Kept]):
     def __init__(self, most: int):
         self._most = most
         self._kept: OrderedDict[Key, tuple[Kept, int]] = OrderedDict()
+        self._making: dict[Key, Future[Kept]] = {}
         self._lock = threading.Lock()
 
     def get(self, key: Key) -> Kept | None:
@@ -24,6 +26,35 @@ class Remembered(Generic[Key, Kept]):
                 return None
             self._kept.move_to_end(key)
             return self._kept[key][0]
+
+    def made(self, key: Key, make: Callable[[], Kept], size: Callable[[Kept], int]) -> Kept:
+        """What was kept, else what `make` makes, once for all who ask for it meanwhile; an error is
+        theirs, too, and is not kept.
+        """
+        kept = self.get(key)
+        if kept is not None:
+            return kept
+        with self._lock:
+            mine: Future[Kept] = Future()
+            others = self._making.get(key)
+            if others is None:
+                self._making[key] = mine
+        if others is not None:
+            return others.result()
+        try:
+            # Another may have made it since it was looked for.
+            thing = self.get(key)
+            if thing is None:
+                thing = make()
+                self.keep(key, thing, size(thing))
+            mine.set_result(thing)
+            return thing
+        except BaseException as error:
+            mine.set_exception(error)
+            raise
+        finally:
+            with self._lock:
+                del self._making[key]
 
     def keep(self, key: Key, thing: Kept, size: int) -> None:
         """Keep one and forget the least recently used ones that are too many."""

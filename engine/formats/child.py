@@ -69,7 +69,12 @@ class ChildTable(Table):
         kind: str = "",
         options: Mapping[str, float] | None = None,
         bounds: Bounds = BOUNDS,
+        folder: Path | None = None,
     ):
+        """Open a file of a kind, looked for in its first bytes where it is not told.
+
+        folder : where the child's own folder is made; None for the system's temporary one
+        """
         self.source = source
         self._bounds = bounds
         self._listed: dict[str, Any] | None
@@ -81,7 +86,7 @@ class ChildTable(Table):
             "wall": int(10 * bounds.wall) + bounds.cpu,
             "written": WRITTEN,
         }
-        self._folder = tempfile.mkdtemp(prefix="ridetune-")
+        self._folder = tempfile.mkdtemp(prefix="ridetune-", dir=folder and folder.absolute())
         self._speak, theirs = socket.socketpair()
         try:
             with theirs:

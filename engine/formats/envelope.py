@@ -28,9 +28,11 @@ class Envelope:
 
 
 def envelope(table: Table, index: int, points: int) -> Envelope:
-    """The envelope of one column in at most so many stretches."""
+    """The envelope of one column in at most so many stretches, none where it has no samples."""
     column = table.columns[index]
-    count = max(min(points, column.samples), 1)
+    count = min(points, column.samples)
+    if not count:
+        return Envelope(*np.empty((3, 0)))
     begins = (np.arange(count) * column.samples) // count
     if column.samples <= WHOLE:
         low, high = _extremes(table.values(index), begins)

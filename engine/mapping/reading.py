@@ -29,7 +29,7 @@ def read_recording(
     notes = read_notes(beside) if beside.is_file() else RunNotes()
     try:
         with opened(path, path.name) as table:
-            return _mapped(table, mapping, {**notes.noise, **(noise or {})}, notes.description)
+            return mapped_run(table, mapping, {**notes.noise, **(noise or {})}, notes.description)
     except OSError as error:
         raise _unreadable(path, error) from error
 
@@ -44,7 +44,7 @@ def parse_recording(
 ) -> Run:
     """Read the bytes of a file that a stranger sent under a mapping; see `parse_run`."""
     with opened_bytes(data, name, apart=True, bounds=bounds) as table:
-        return _mapped(table, mapping, noise or {}, "")
+        return mapped_run(table, mapping, noise or {}, "")
 
 
 def survey_file(path: str | Path) -> Survey:
@@ -57,7 +57,7 @@ def survey_file(path: str | Path) -> Survey:
         raise _unreadable(path, error) from error
 
 
-def _mapped(
+def mapped_run(
     table: Table, mapping: ChannelMapping, noise: Mapping[str, float], description: str
 ) -> Run:
     """The run, with the notes that the file carries in itself where none lie beside it."""

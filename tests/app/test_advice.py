@@ -45,6 +45,11 @@ def test_advice_after_an_identification(engineer):
     for one, other in zip(told["now"]["parameters"], done["result"]["parameters"], strict=True):
         assert one["name"] == other["name"]
         assert one["std_error"] == pytest.approx(other["std_error"], rel=0.01)
+    # What is done to the recording afterwards is nothing to the fit.
+    steps = [{"kind": "scale", "channel": "chassis.z", "gain": -2}]
+    engineer.put(f"/measurements/{run}/conditioning", json={"steps": steps})
+    again = engineer.post("/advice", json=asked).json()
+    assert (again["now"], again["candidates"]) == (told["now"], told["candidates"])
     refused = engineer.post("/advice", json=asked | {"vehicle": PAPER})
     assert (refused.status_code, refused.json()["field"]) == (422, "vehicle")
 

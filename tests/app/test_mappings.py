@@ -4,6 +4,8 @@ import json
 
 import numpy as np
 import pytest
+from ridetune.app.recordings import as_stated, stated
+from ridetune.engine.formats.child import ChildTable
 from ridetune.engine.measurement import read_run
 
 from .conftest import SAMPLES, short_recording
@@ -148,6 +150,18 @@ def test_another_mapping_makes_another_run(visitor, kept):
     assert forgotten == kept
 
 
+def test_a_job_reads_a_recording_as_it_was_mapped_then(visitor, kept):
+    """Its mapping, and what was done to it, are the job's for ever."""
+    path, shared = f"/measurements/{kept['id']}", visitor.client.app.state.services
+    visitor.put(f"{path}/mapping", json=visitor.get(f"{path}/columns").json()["proposed"])
+    mapped = shared.store.measurement(visitor.id, kept["id"])
+    run = shared.recordings.run(mapped)
+    assert visitor.delete(f"{path}/mapping").json()["needs_mapping"] is True
+    now = shared.store.measurement(visitor.id, kept["id"])
+    again = shared.recordings.run(as_stated(now, stated(mapped)))
+    np.testing.assert_array_equal(again["chassis.z"], run["chassis.z"])
+
+
 def test_notes_of_a_file_that_needs_a_mapping_wait_for_it(visitor, kept):
     path = f"/measurements/{kept['id']}"
     noted = visitor.put(f"{path}/notes", content=b'[noise]\n"chassis.z" = 0.5\n').json()
@@ -207,6 +221,18 @@ def test_a_preview_shows_the_file_s_numbers_over_time_in_s(visitor, kept):
     assert "they go from 0 to 8" in beyond.json()["detail"]
 
 
+def test_a_preview_of_any_length_asks_for_few_numbers(monkeypatch, visitor, kept):
+    """Oracle: no whole column, and no part of one, leaves the child."""
+
+    def whole(*_):
+        raise AssertionError("the samples themselves were asked for")
+
+    for name in ("values", "part", "in_si"):
+        monkeypatch.setattr(ChildTable, name, whole)
+    shown = visitor.get(f"/measurements/{kept['id']}/columns/preview?index=2&points=40").json()
+    assert len(shown[0]["time"]) == 40
+
+
 def test_a_mapping_that_is_kept_is_proposed_for_the_next_file(visitor, kept):
     """A column was taken for nothing, and pitch turned over: as the engineer said."""
     path = f"/measurements/{kept['id']}"
@@ -228,3 +254,21 @@ def test_a_mapping_that_is_kept_is_proposed_for_the_next_file(visitor, kept):
     assert found["template"] is None
     bad = visitor.post("/mappings", json={"name": "x", "mapping": {"columns": 1}})
     assert bad.status_code == 422
+
+
+@pytest.mark.parametrize("name", [".", "..", "a/b", "a\\b", "../x"])
+def test_a_name_that_an_address_cannot_hold_is_refused(visitor, name):
+    """A browser makes the session's own address of mappings/.. ."""
+    mapping = {"columns": [{"column": "x", "channel": "chassis.z", "unit": "m"}]}
+    reply = visitor.post("/mappings", json={"name": name, "mapping": mapping})
+    assert (reply.status_code, reply.json()["field"]) == (422, "name")
+    assert "give a name without / and \\ that is more than dots" in reply.json()["detail"]
+    assert visitor.get("/mappings").json() == []
+
+
+@pytest.mark.parametrize("path", ["/", "/mappings/"])
+def test_an_address_with_a_slash_too_many_deletes_nothing(visitor, path):
+    """Oracle: what is there afterwards; httpx follows a redirection as a browser does."""
+    reply = visitor.delete(path, follow_redirects=True)
+    assert reply.status_code in (404, 405)
+    assert visitor.get().status_code == 200

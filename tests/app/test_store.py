@@ -384,3 +384,12 @@ def test_jobs_of_another_session_are_not_found(store, session):
         store.jobs.get(other, job)
     store.jobs.delete(other, job)
     assert store.jobs.get(session, job).id == job
+
+
+def test_what_was_being_read_when_the_service_was_killed_is_removed(tmp_path):
+    left = tmp_path / "reading/ridetune-child"
+    left.mkdir(parents=True)
+    (left / "half.bin").write_bytes(b"1")
+    (tmp_path / "reading/upload").write_bytes(b"2")
+    Store(tmp_path, Limits()).close()
+    assert list((tmp_path / "reading").iterdir()) == []

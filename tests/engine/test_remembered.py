@@ -1,3 +1,7 @@
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
 from ridetune.engine.remembered import Remembered
 
 
@@ -24,3 +28,28 @@ def test_a_key_kept_again_holds_the_last_thing_and_counts_once():
     kept.keep("a", 2, 5)
     kept.keep("b", 3, 1)
     assert (kept.get("a"), kept.get("b")) == (2, 3)
+
+
+def test_a_thing_is_made_once_for_all_who_ask_meanwhile():
+    """Oracle: how often it was made; the maker waits for the one who asks for another key."""
+    kept, made, go = Remembered(6), [], threading.Event()
+
+    def make():
+        go.wait(10)
+        made.append("A")
+        return "A"
+
+    with ThreadPoolExecutor(4) as pool:
+        asked = [pool.submit(kept.made, "a", make, len) for _ in range(4)]
+        assert kept.made("b", lambda: "B", len) == "B"
+        go.set()
+        assert [one.result() for one in asked] == ["A"] * 4
+    assert made == ["A"]
+    assert kept.get("a") == "A"
+
+
+def test_an_error_is_raised_and_not_kept():
+    kept = Remembered(6)
+    with pytest.raises(ZeroDivisionError):
+        kept.made("a", lambda: 1 // 0, abs)
+    assert kept.made("a", lambda: 2, abs) == 2

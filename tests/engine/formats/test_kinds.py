@@ -15,7 +15,9 @@ from ridetune.engine.channels import Run
 from ridetune.engine.clocks import even_time
 from ridetune.engine.errors import MeasurementError
 from ridetune.engine.formats.child import ChildTable
+from ridetune.engine.formats.envelope import envelope
 from ridetune.engine.formats.kinds import kind_of
+from ridetune.engine.formats.table import Column, HeldTable
 from ridetune.engine.mdf4 import run_to_mdf4
 from ridetune.engine.measurement import read_run
 
@@ -91,6 +93,11 @@ def test_an_envelope_holds_the_extremes_of_its_stretches(folder, name):
     assert_allclose(found.minimum, stretches.min(axis=1))
     assert_allclose(found.maximum, stretches.max(axis=1))
     assert_allclose(found.time, files.TIME[::5], atol=1e-15)
+
+
+def test_an_envelope_of_no_samples_has_no_stretches():
+    found = envelope(HeldTable("r", "CSV", (Column("z", "mm", 0),), [np.empty(0)]), 0, 10)
+    assert (found.time.size, found.minimum.size, found.maximum.size) == (0, 0, 0)
 
 
 def test_noise_and_description_of_our_own_mdf4_come_back(tmp_path):

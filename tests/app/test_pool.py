@@ -1,4 +1,4 @@
-"""The pool for interactive simulations: as wide as told, fair, and it refuses what piles up."""
+"""The pools of the service: as wide as told, fair, and it refuses what piles up."""
 
 import asyncio
 import threading
@@ -8,8 +8,12 @@ from typing import Any
 
 import pytest
 from ridetune.app.errors import Busy, Unavailable
-from ridetune.app.interactive import Interactive
-from ridetune.app.settings import Limits
+from ridetune.app.pool import Pool
+
+
+def pool_of(**told: int) -> Pool:
+    """One that takes much, one at a time, unless told otherwise."""
+    return Pool("simulations", **({"width": 1, "share": 9, "most": 99, "at_once": 9} | told))
 
 
 def in_a_loop(run: Callable[[], Coroutine[Any, Any, Any]]) -> Any:
@@ -20,7 +24,7 @@ def in_a_loop(run: Callable[[], Coroutine[Any, Any, Any]]) -> Any:
 
 def test_no_more_runs_at_once_than_the_pool_is_wide():
     """Each job waits at a barrier of two: three at once would break it, fewer would hang."""
-    pool = Interactive(Limits(), width=2)
+    pool = pool_of(width=2)
     lock, now, most = threading.Lock(), [0], [0]
     barrier = threading.Barrier(2, timeout=10)
 
@@ -41,7 +45,7 @@ def test_no_more_runs_at_once_than_the_pool_is_wide():
 
 
 def test_a_session_over_its_share_is_refused_and_free_again_afterwards():
-    pool = Interactive(Limits(session_simulations=2), width=1)
+    pool = pool_of(share=2)
     go = threading.Event()
 
     async def run() -> list:
@@ -59,7 +63,7 @@ def test_a_session_over_its_share_is_refused_and_free_again_afterwards():
 
 
 def test_a_full_queue_is_refused_at_once():
-    pool = Interactive(Limits(waiting_simulations=1), width=1)
+    pool = pool_of(most=1)
     go = threading.Event()
 
     async def run() -> None:
@@ -75,12 +79,37 @@ def test_a_full_queue_is_refused_at_once():
 
 
 def test_an_error_goes_to_its_caller_and_frees_the_place():
-    pool = Interactive(Limits(session_simulations=1), width=1)
+    pool = pool_of(share=1)
 
     async def run() -> None:
         for _ in range(3):
             with pytest.raises(ZeroDivisionError):
                 await pool.run("session", lambda: 1 / 0)
+
+    in_a_loop(run)
+    pool.close()
+
+
+def test_a_session_waits_for_its_turn_while_others_run():
+    """Two of the greedy one's never run together; the modest one's runs beside the first."""
+    pool = pool_of(width=2, at_once=1)
+    meet = threading.Barrier(2, timeout=10)
+    lock = threading.Lock()
+
+    def work() -> None:
+        assert lock.acquire(blocking=False)
+        lock.release()
+
+    def first() -> None:
+        with lock:
+            meet.wait()
+
+    async def run() -> None:
+        await asyncio.gather(
+            pool.run("greedy", first),
+            *(pool.run("greedy", work) for _ in range(3)),
+            pool.run("modest", meet.wait),
+        )
 
     in_a_loop(run)
     pool.close()

@@ -1,0 +1,69 @@
+"""Work of requests that must not be done all at once: a thread pool, and a short queue before it.
+
+A session has its share of what is under way; more than that is refused at once so that nobody else
+waits, and what would wait too long is refused with the time after which to try again. Whoever waits
+holds no thread.
+"""
+
+import asyncio
+from collections import Counter
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+from .errors import Busy, Unavailable
+
+T = TypeVar("T")
+
+
+class Pool:
+    """Runs functions for sessions; used from the event loop only."""
+
+    def __init__(
+        self, what: str, width: int, *, share: int, most: int, at_once: int, retry_after: int = 1
+    ):
+        """Keyword arguments are numbers of functions.
+
+        what : what is done, for sentences
+        width : run at once;  most : under way, waiting ones included
+        share, at_once : of one session, under way and running
+        retry_after : s after which who is refused may try again
+        """
+        self._what = what
+        self._share, self._most, self._at_once = share, most, at_once
+        self._retry_after = retry_after
+        self._pool = ThreadPoolExecutor(width, what.replace(" ", "-"))
+        self._under_way: Counter[str] = Counter()
+        self._turns: dict[str, asyncio.Semaphore] = {}
+
+    @property
+    def under_way(self) -> int:
+        """How many functions run or wait."""
+        return self._under_way.total()
+
+    async def run(self, session: str, work: Callable[[], T]) -> T:
+        """Result of `work`, run for a session; `Busy` or `Unavailable` where too much waits."""
+        if self._under_way[session] >= self._share:
+            raise Busy(
+                f"The session already has {self._under_way[session]} {self._what} under way; wait "
+                "for one of them.",
+                retry_after=self._retry_after,
+            )
+        if self.under_way >= self._most:
+            raise Unavailable(
+                f"The service is busy with {self.under_way} {self._what}; try again in a moment.",
+                retry_after=self._retry_after,
+            )
+        self._under_way[session] += 1
+        turn = self._turns.setdefault(session, asyncio.Semaphore(self._at_once))
+        try:
+            async with turn:
+                return await asyncio.get_running_loop().run_in_executor(self._pool, work)
+        finally:
+            self._under_way[session] -= 1
+            if not self._under_way[session]:
+                del self._under_way[session], self._turns[session]
+
+    def close(self) -> None:
+        """Wait for what runs, forget what waits."""
+        self._pool.shutdown(cancel_futures=True)
