@@ -80,6 +80,8 @@ class ChildTable(Table):
             "cpu": bounds.cpu,
             "wall": int(10 * bounds.wall) + bounds.cpu,
             "written": WRITTEN,
+            # Beside it what the readers of CarMaker and TDMS look for.
+            "reads": [f"{path.absolute()}{ending}" for ending in ("", ".info", "_index")],
         }
         self._folder = tempfile.mkdtemp(prefix="ridetune-")
         self._speak, theirs = socket.socketpair()

@@ -22,6 +22,7 @@ from ridetune.engine.formats import readers
 from ridetune.engine.formats.child import Bounds
 from ridetune.engine.formats.confine import landlock_version
 from ridetune.engine.formats.opening import opened
+from ridetune.engine.formats.syscalls import filtered
 from ridetune.engine.measurement import parse_run
 from scipy.io import savemat
 
@@ -322,12 +323,56 @@ def test_a_child_has_nothing_of_its_parents(tmp_path, monkeypatch):
     assert not os.path.exists(said.split("'")[-2])
 
 
-@pytest.mark.skipif(landlock_version() < 1, reason="this system has no Landlock")
-def test_a_child_leaves_nothing_outside_its_folder(tmp_path, monkeypatch):
-    slow(monkeypatch, STUB.format(f"open({str(tmp_path / 'garbage')!r}, 'w')"))
+TRIES = """
+import os, socket, subprocess, sys
+tries = {
+    "makes": lambda: open(victim + ".new", "w"),
+    "writes": lambda: open(victim, "r+"),
+    "truncates": lambda: os.truncate(victim, 0),
+    "removes": lambda: os.unlink(victim),
+    "renames": lambda: os.rename(victim, victim + ".new"),
+    "reads": lambda: open(victim),
+    "lists": lambda: os.listdir(os.path.dirname(victim)),
+    "passwords": lambda: open("/etc/passwd"),
+    "signals": lambda: os.kill(os.getppid(), 0),
+    "chmods": lambda: os.chmod(victim, 0o777),
+    "touches": lambda: os.utime(victim, (0, 0)),
+    "forks": lambda: os.fork() or os._exit(0),
+    "runs": lambda: subprocess.run([sys.executable, "-c", "0"]),
+    "connects": lambda: socket.socket(),
+    "escapes": os.setsid,
+    "works": lambda: open("own", "w").write("1"),
+}
+done = []
+for name, attempt in tries.items():
+    try:
+        attempt()
+        done.append(name)
+    except OSError:
+        pass
+import ridetune.engine.errors
+raise ridetune.engine.errors.MeasurementError(" ".join(done) + ".")
+"""
+
+
+@pytest.mark.skipif(
+    landlock_version() < 6 or not filtered(), reason="this system confines a child less"
+)
+def test_a_child_can_do_nothing_outside_its_folder(tmp_path, monkeypatch):
+    """Nor read anything else, nor have processes of its own, which its limits would not end."""
+    victim = tmp_path / "elsewhere" / "victim"
+    victim.parent.mkdir()
+    victim.write_text("kept")
+    before = victim.stat()
+    tries = f"victim = {str(victim)!r}\n{TRIES}"
+    slow(monkeypatch, STUB.format(f"exec({tries!r}, {{}})"))
     path = held(tmp_path, "r.tdms", b"TDSm" + bytes(100))
-    assert "(PermissionError)" in refusal(path)
-    assert not (tmp_path / "garbage").exists()
+    with pytest.raises(MeasurementError, match=r"^works\.$"), opened(path, "r.tdms"):
+        pass
+    assert victim.read_text() == "kept"
+    assert list(victim.parent.iterdir()) == [victim]
+    after = victim.stat()
+    assert (after.st_mode, after.st_mtime_ns) == (before.st_mode, before.st_mtime_ns)
 
 
 def test_a_missing_package_is_named(tmp_path, monkeypatch):
