@@ -73,8 +73,9 @@ export function columnsOf(entries, columns) {
 }
 
 /** Why the entry of a column is worth a look, in a word or two; "" for one that is not. */
-export function doubt({ confidence, doubted }, { unit }) {
+export function doubt({ confidence, doubted, sign, note }, { unit }) {
   if (doubted) return unit ? "unit doubted" : "unit guessed";
+  if (sign < 0 && confidence !== null && !note.startsWith("template")) return "sign turned over";
   return confidence !== null && confidence < UNSURE ? "unsure" : "";
 }
 

@@ -265,6 +265,9 @@ def _warnings(
         name, numbers = columns[index].name, known.get(index)
         if "lies:" in one.reason or ", but " in one.reason:
             said.append(f"{name} is taken as {one.channel} in {one.unit}: {one.reason}.")
+        if one.sign < 0:
+            why = one.reason.partition("; turned over, ")[2]
+            said.append(f"{name} is taken as {one.channel} turned over, {why}; look at its sign.")
         if numbers is None:
             continue
         for value, samples in numbers.stand_ins:

@@ -322,11 +322,25 @@ def test_angle_by_unit_is_a_rate_by_unit():
         ("Verzoegerung", "", -1),
         ("damper travel fl", "rebound positive", -1),
         ("acc_x", "", 1),
+        ("acc_x", "rearward positive", -1),
+        ("LaengsVerzoegerung", "", -1),
+        ("pitch_NoseUp", "", -1),
+        ("acc_x", "acceleration (positive) / deceleration (negative)", 1),
+        ("acc_x", "by backward difference", 1),
+        ("heave", "not z-down", 1),
+        ("heave", "z down is negative", 1),
+        ("roll", "signal of right update rate", 1),
+        ("roll", "left side up, right side down", 1),
+        ("pitch", "negative for nose up", 1),
+        ("pitch", "not calibrated, nose up", -1),
     ],
 )
 def test_a_stated_sign_is_followed(name, comment, sign):
-    unit = {"pitch": "deg", "roll": "deg", "acc_x": "g", "Verzoegerung": "g"}.get(name, "mm")
-    assert guessed_name(name, unit, comment).chosen[0].sign == sign
+    units = {"pitch": "deg", "roll": "deg", "pitch_NoseUp": "deg", "heave": "mm"}
+    unit = units.get(name, "mm" if "travel" in name else "g")
+    found = guessed_name(name, unit, comment)
+    assert found.chosen[0].sign == sign
+    assert [f"{name} is taken as" in one for one in found.warnings] == [True] * (sign < 0)
 
 
 # --- rivals and numbers -----------------------------------------------------------------------
