@@ -90,6 +90,7 @@ def apply(
 def _found(mapping: ChannelMapping, table: Table) -> dict[str, tuple[MappedColumn, int]]:
     """By channel its entry, and which column of the table that is."""
     found, places = {}, Places(table.columns)
+    taken: dict[int, MappedColumn] = {}
     for entry in mapping.columns:
         where = places.of(entry.column, entry.group)
         if len(where) != 1:
@@ -99,6 +100,13 @@ def _found(mapping: ChannelMapping, table: Table) -> dict[str, tuple[MappedColum
             raise MeasurementError(
                 f"{table.source}: the file {what} called {entry.column!r}{group}, which the"
                 f" mapping takes for {entry.channel}; {remedy}."
+            )
+        other = taken.setdefault(where[0], entry)
+        if other is not entry:
+            raise MeasurementError(
+                f"{table.source}: the file has one column called {entry.column!r}, which the"
+                f" mapping takes for {other.channel} (group {other.group!r}) and for"
+                f" {entry.channel} (group {entry.group!r}); keep one of them."
             )
         found[entry.channel] = entry, where[0]
     return found

@@ -107,10 +107,10 @@ class ChannelMapping:
         return frozenset(one.channel for one in self.columns if one.sign_sure)
 
     def fits(self, columns: "Places") -> bool:
-        """Whether a file has every column."""
-        return bool(self.columns) and all(
-            len(columns.of(one.column, one.group)) == 1 for one in self.columns
-        )
+        """Whether a file has every column, each another one."""
+        found = [columns.of(one.column, one.group) for one in self.columns]
+        alone = {where[0] for where in found if len(where) == 1}
+        return bool(found) and len(alone) == len(found)
 
 
 class Places:

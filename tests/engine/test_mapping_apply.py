@@ -112,6 +112,15 @@ def test_columns_of_one_name_are_told_apart_by_their_group():
     np.testing.assert_allclose(apply(mapped("C"), alone)["chassis.z"], 1e-3 * wave())
 
 
+def test_one_column_is_never_two_channels():
+    """Two groups of the file that was mapped, one column without a group in this one."""
+    body = MappedColumn("acc_z", "chassis.a_z", "g", "IMU")
+    mapping = ChannelMapping((body, MappedColumn("acc_z", "seat.driver.a_z", "g", "Seat")))
+    table = table_of(("acc_z", 0.0, 0.01, wave()))
+    assert not mapping.fits(Places(table.columns))
+    assert "takes for chassis.a_z (group 'IMU') and for seat.driver.a_z" in refusal(mapping, table)
+
+
 def test_time_alone_is_no_recording():
     table = held({"Time": ("s", TIME), "height": ("mm", wave())})
     assert "names no channel besides time" in refusal(ChannelMapping((CLOCK,)), table)
