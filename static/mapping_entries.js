@@ -44,7 +44,8 @@ export function entriesOf(mapping, columns) {
     }
     const { guess, candidates, stand_ins: standIns } = found[0];
     const likely = [guess, ...candidates].find((one) =>
-      one && one.channel === told.channel && one.unit === told.unit && one.reason === told.note);
+      one && one.channel === told.channel && one.unit === told.unit
+        && (one.reason === told.note || (one.doubted && one.reason.startsWith("template"))));
     const missing = told.missing ?? (standIns.length ? standIns.map(({ value }) => value) : null);
     entries.set(found[0].index, { sign: 1, gain: 1, note: "", ...told, missing,
       confidence: likely?.confidence ?? null, doubted: likely?.doubted ?? false });

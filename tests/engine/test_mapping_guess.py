@@ -1,5 +1,7 @@
 """Which column is which channel. Oracle throughout: a table made of channels that are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -443,10 +445,34 @@ def test_of_a_file_too_large_only_what_may_be_a_channel_is_read(monkeypatch):
 
 def test_a_template_that_fits_is_proposed_in_place_of_the_guess():
     table = renamed(truth(), SCHEMES["German"])
-    other = ChannelMapping((MappedColumn("Nickwinkel", "chassis.roll", "mrad", sign=-1),))
+    other = ChannelMapping((MappedColumn("Nickwinkel", "chassis.roll", "deg", sign=-1),))
     missing = ChannelMapping((MappedColumn("not there", "chassis.roll", "mrad"),))
     found = survey(table).with_templates({"a": missing, "b": other})
     assert (found.template, found.guess.mapping) == ("b", other)
     [one] = found.guess.chosen.values()
-    assert (one.channel, one.unit, one.sign, one.reason) == ("chassis.roll", "mrad", -1, "template")
+    assert (one.channel, one.unit, one.sign, one.reason) == ("chassis.roll", "deg", -1, "template")
     assert survey(table).with_templates({"a": missing}).template == ""
+
+
+def test_a_template_in_another_unit_than_the_file_states_is_doubted():
+    """The template comes from a file in mm; spellings of a unit are no other unit."""
+    time = np.arange(0.0, 5.0, 0.01)
+    entries = (
+        MappedColumn("z", "chassis.z", "mm"),
+        MappedColumn("ax", "chassis.a_x", "m/s^2"),
+        MappedColumn("roll", "chassis.roll", "deg"),
+    )
+    table = held(
+        {
+            "z": ("cm", 2.0 * np.sin(time)),
+            "ax": ("m|s2", np.sin(time)),
+            "roll": ("", np.sin(time)),
+        }
+    )
+    found = survey(table).with_templates({"mm": ChannelMapping(entries)})
+    doubted = [(one.doubted, one.confidence < 1.0) for one in found.guess.chosen.values()]
+    assert doubted == [(True, True), (False, False), (False, False)]
+    [said] = found.warnings
+    assert said.startswith("z is in cm by the file, but the template takes chassis.z in mm")
+    same = replace(entries[0], unit="cm")
+    assert not survey(table).with_templates({"cm": ChannelMapping((same,))}).warnings
