@@ -13,7 +13,7 @@ from scipy.optimize import linear_sum_assignment
 from ..channels import ChannelInfo, channel, find_channel
 from ..csv_table import split_title
 from ..formats.table import Column
-from .mapping import ChannelMapping, MappedColumn, Places
+from .mapping import ChannelMapping, MappedColumn, Places, told_apart
 from .names import readings
 from .numbers import Statistics
 from .patterns import MEASURES, fits
@@ -94,9 +94,9 @@ def guess(
     candidates = [
         _candidates(one, known.get(index), index in clocks) for index, one in enumerate(columns)
     ]
-    twice = _named_twice(columns)
-    for index in (*twice, *(clocks if clocks_told else ())):
+    for index in clocks if clocks_told else ():
         candidates[index] = []
+    columns = told_apart(columns)
     chosen = _body_fixed(_assigned(candidates), candidates)
     for index, one in chosen.items():
         rivals = [
@@ -118,7 +118,7 @@ def guess(
         mapping,
         chosen,
         tuple(tuple(offered[:MOST_CANDIDATES]) for offered in candidates),
-        tuple(_warnings(columns, known, chosen, twice)),
+        tuple(_warnings(columns, known, chosen)),
     )
 
 
@@ -147,7 +147,7 @@ def with_template(
                 f"{one.column} is in {stated} by the file, but the template takes {one.channel}"
                 f" in {one.unit}; see which of them holds."
             )
-    said += _warnings(columns, known, chosen, _named_twice(columns))
+    said += _warnings(columns, known, chosen)
     return replace(found, mapping=template, chosen=chosen, warnings=tuple(said))
 
 
@@ -263,32 +263,15 @@ def _body_fixed(
     return chosen
 
 
-def _named_twice(columns: Sequence[Column]) -> list[int]:
-    """Columns that cannot be told from an earlier one by group and name."""
-    seen: set[tuple[str, str]] = set()
-    twice = []
-    for index, one in enumerate(columns):
-        if (one.group, one.name) in seen:
-            twice.append(index)
-        seen.add((one.group, one.name))
-    return twice
-
-
 def _warnings(
     columns: Sequence[Column],
     known: Mapping[int, Statistics],
     chosen: Mapping[int, Candidate],
-    twice: Sequence[int],
 ) -> list[str]:
     """Sentences about units that lie, stand-ins, gaps, clipping and constant columns."""
     said = []
     if all(one.channel == "time" for one in chosen.values()):
         said.append("No column is taken for a channel by its name; map some by hand.")
-    for index in twice:
-        said.append(
-            f"Column {index + 1} is called {columns[index].name} like an earlier one; it can be"
-            " mapped once one of them is renamed."
-        )
     for index, one in chosen.items():
         name, numbers = columns[index].name, known.get(index)
         if "lies:" in one.reason or ", but " in one.reason:

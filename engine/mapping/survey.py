@@ -7,7 +7,7 @@ from ..errors import MeasurementError
 from ..formats.kinds import CSV
 from ..formats.table import Column, Table
 from .guess import Guess, guess, named_like_channels, with_template
-from .mapping import ChannelMapping, Places
+from .mapping import ChannelMapping, Places, told_apart
 from .numbers import Statistics, statistics
 
 MOST_SURVEYED = 25_000_000
@@ -68,4 +68,4 @@ def survey(table: Table) -> Survey:
         )
     found = guess(columns, known, clocks_told=table.kind != CSV)
     doubts = (*table.warnings, *bad)
-    return Survey(table.source, table.kind, columns, known, found, doubts)
+    return Survey(table.source, table.kind, told_apart(columns), known, found, doubts)

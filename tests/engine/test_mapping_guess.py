@@ -1,5 +1,6 @@
 """Which column is which channel. Oracle throughout: a table made of channels that are known."""
 
+import io
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from ridetune.engine.channels import CHANNELS, channel
-from ridetune.engine.formats.table import Column
+from ridetune.engine.formats.csv_file import CsvFile
+from ridetune.engine.formats.table import Column, HeldTable
 from ridetune.engine.mapping.apply import apply
 from ridetune.engine.mapping.guess import THRESHOLD, guess
 from ridetune.engine.mapping.mapping import ChannelMapping, MappedColumn
@@ -394,12 +396,24 @@ def test_raw_sensors_are_told_from_inertial_channels_by_gravity():
     assert inertial.chosen[1].sign == 1
 
 
-def test_columns_of_one_name_are_not_told_apart():
+def test_columns_of_one_name_are_told_apart_by_number():
+    """What is proposed of such a file can be applied, and each of the columns be mapped."""
     time = np.arange(0.0, 5.0, 0.01)
-    table = held({"Time": ("s", time), "heave": ("mm", np.sin(time))})
-    doubled = guess([*table.columns, table.columns[1]], {})
-    assert sorted(doubled.chosen) == [0, 1]
-    assert any("Column 3 is called heave like an earlier one" in one for one in doubled.warnings)
+    one, other = 3.0 * np.sin(time), 5.0 * np.cos(time)
+    described = [Column(name, "mm", time.size, step=0.01) for name in ("z", "z (2)", "z", "z")]
+    table = HeldTable("lap", "test", tuple(described), [one, one, other, time])
+    found = survey(table)
+    assert [column.name for column in found.columns] == ["z", "z (2)", "z (3)", "z (4)"]
+    apply(guessed(table).mapping, table)
+    run = apply(ChannelMapping((MappedColumn("z (3)", "chassis.z", "mm"),)), table)
+    np.testing.assert_allclose(run["chassis.z"], 1e-3 * other)
+    text = b"time [s],heave [mm],heave [mm]\n" + b"".join(
+        b"%g,%g,%g\n" % row for row in zip(time, one, other, strict=True)
+    )
+    table = CsvFile(io.BytesIO(text), "lap.csv")
+    mapping = guessed(table).mapping
+    assert [entry.column for entry in mapping.columns] == ["time", "heave"]
+    np.testing.assert_allclose(apply(mapping, table)["chassis.z"], 1e-3 * one, rtol=1e-5)
 
 
 def test_stand_ins_gaps_and_constant_columns_are_named():
