@@ -1,14 +1,18 @@
 """TDMS (National Instruments), by npTDMS: LabVIEW and DAQmx.
 
-The unit is the channel's unit_string, the time its wf_increment and wf_start_offset or, where the
-channel has none, the channel of its group called time. Scaling is the file's, done by npTDMS.
+The unit is the channel's unit_string, the time its wf_increment, wf_start_offset and wf_start_time
+or, where the channel has none, the channel of its group called time. Dates, those at which
+waveforms begin among them, count in s from the earliest of the file. Scaling is the file's, done by
+npTDMS.
 """
 
 import math
 from pathlib import Path
 from typing import Any
 
-from .listing import Listing, first_text, nearest_clocks, numbers, plain
+import numpy as np
+
+from .listing import Listing, earliest, first_text, nearest_clocks, numbers, plain
 from .table import Array, Column, Table
 
 
@@ -35,8 +39,15 @@ class TdmsTable(Table):
         clocks = nearest_clocks(
             [((plain(one.group_name), plain(one.name)), len(one)) for one in taken]
         )
-        for channel, clock in zip(taken, clocks, strict=True):
+        begins = [_begin(one) for one in taken]
+        self._since = earliest(begins)
+        undated = []
+        for channel, clock, begin in zip(taken, clocks, begins, strict=True):
             start, step = _waveform(channel.properties)
+            if step is not None and not np.isnat(begin):
+                start += float((begin - self._since) / np.timedelta64(1, "ns")) * 1e-9
+            elif step is not None and not np.isnat(self._since):
+                undated.append(plain(channel.name))
             column = Column(
                 plain(channel.name),
                 _unit(channel),
@@ -49,15 +60,32 @@ class TdmsTable(Table):
             )
             listing.add(column, channel)
         self.columns, self.warnings = listing.columns(), listing.warnings()
+        if undated:
+            self.warnings += (
+                f"When {', '.join(undated[:5])} began (wf_start_time) is not stated, unlike that of"
+                " other channels; it is taken to be when the first of them began.",
+            )
         self._channels = listing.places
 
     def values(self, index: int) -> Array:
         """Scaled values of one channel."""
-        return numbers(self._channels[index].read_data(scaled=True))
+        return numbers(self._channels[index].read_data(scaled=True), self._since)
 
     def part(self, index: int, begin: int, count: int) -> Array:
         """Some scaled values of one channel."""
-        return numbers(self._channels[index].read_data(offset=begin, length=count, scaled=True))
+        read = self._channels[index].read_data(offset=begin, length=count, scaled=True)
+        return numbers(read, self._since)
+
+
+def _begin(channel: Any) -> np.datetime64:
+    """When a channel begins, NaT where nothing tells: its first date, or what its waveform says."""
+    if channel.dtype.kind == "M":
+        return earliest(channel.read_data(offset=0, length=1))
+    said = channel.properties.get("wf_start_time")
+    # LabVIEW's zero is 1904.
+    if not isinstance(said, np.datetime64) or said < np.datetime64("1904-01-02"):
+        return np.datetime64("NaT")
+    return said
 
 
 def _waveform(properties: Any) -> tuple[float, float | None]:

@@ -8,8 +8,11 @@ from pathlib import Path
 
 import cmerg
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from asammdf import MDF, Signal
+from nptdms import ChannelObject, TdmsWriter
 from numpy.testing import assert_allclose
 from ridetune.engine.channels import Run
 from ridetune.engine.errors import MeasurementError
@@ -125,6 +128,43 @@ def test_the_run_is_cut_to_what_its_clocks_share(tmp_path):
     assert 0.205 <= run.time[0] < 0.215
     assert run.time[-1] == pytest.approx(1.0)
     assert any("cut to the time its clocks share, from 0.205 to 1 s" in w for w in run.warnings)
+
+
+BEGIN = np.datetime64("2024-03-12T10:00:00.000000")
+LATER = BEGIN + np.timedelta64(1500, "ms")
+
+
+@pytest.mark.parametrize(
+    ("begins", "starts", "said"),
+    [((LATER, BEGIN), (1.75, 0.25), []), ((BEGIN, None), (0.25, 0.25), ["When z1 began"])],
+)
+def test_waveforms_begin_when_they_say(tmp_path, begins, starts, said):
+    with TdmsWriter(tmp_path / "r.tdms") as writer:
+        for number, begin in enumerate(begins):
+            told = {"wf_increment": 0.01, "wf_start_offset": 0.25}
+            dated = {} if begin is None else {"wf_start_time": begin}
+            one = ChannelObject(f"group {number}", f"z{number}", files.Z, {**told, **dated})
+            writer.write_segment([one])
+    with ChildTable(tmp_path / "r.tdms", "r.tdms") as table:
+        assert [column.start for column in table.columns] == pytest.approx(starts)
+        assert [one[:13] for one in table.warnings] == said
+        assert_allclose(time_of(table, 0), starts[0] + files.TIME, rtol=1e-12)
+
+
+def test_dates_of_a_file_count_from_one_beginning(tmp_path):
+    milliseconds = (10 * np.arange(files.Z.size)).astype("timedelta64[ms]")
+    dates = {"A": LATER + milliseconds, "B": BEGIN + milliseconds}
+    with TdmsWriter(tmp_path / "r.tdms") as writer:
+        for group, time in dates.items():
+            z = ChannelObject(group, "z", files.Z)
+            writer.write_segment([ChannelObject(group, "time", time), z])
+    with ChildTable(tmp_path / "r.tdms", "r.tdms") as table:
+        assert_allclose(time_of(table, 1), 1.5 + files.TIME, atol=1e-9)
+        assert_allclose(time_of(table, 3), files.TIME, atol=1e-9)
+    pq.write_table(pa.table({**dates, "z": files.Z}), tmp_path / "r.parquet")
+    with ChildTable(tmp_path / "r.parquet", "r.parquet") as table:
+        assert_allclose(table.values(0), 1.5 + files.TIME, atol=1e-9)
+        assert_allclose(table.values(1), files.TIME, atol=1e-9)
 
 
 @pytest.mark.parametrize(
