@@ -13,6 +13,8 @@ from collections.abc import Iterator
 from itertools import islice
 from typing import NamedTuple
 
+from .time_of_day import is_time_of_day
+
 MOST_LINES = 200
 """Lines of other text that may stand above the header."""
 
@@ -134,9 +136,11 @@ def _trimmed(cells: list[str]) -> list[str]:
 
 
 def _is_data(cells: list[str]) -> bool:
-    """Whether every cell that is not empty is a number, and at least two are."""
+    """Whether every cell that is not empty is a number or a time of day, and at least two are."""
     filled = [cell for cell in cells if cell]
-    return len(filled) >= 2 and all(_NUMBER.fullmatch(cell) for cell in filled)
+    return len(filled) >= 2 and all(
+        _NUMBER.fullmatch(cell) or is_time_of_day(cell) for cell in filled
+    )
 
 
 def _units(names: list[str], cells: list[str]) -> bool:

@@ -2,10 +2,11 @@
 
 Read are UTF-8 (with or without its mark), UTF-16 and UTF-32; commas, semicolons or tabs between
 the columns, the last two also with decimal commas; quotes, blank lines, Excel's `sep=` line and
-any line ending. The names may also stand below lines of other text, above a row of units, and be
-parted by bars or spaces: see `csv_layout`. The file is read as a stream and its numbers by numpy,
-so memory is that of the numbers. Only when numpy refuses, or reads something that is not finite,
-is the file gone through once more to name the first bad cell.
+any line ending. Times of day count in s from the first. The names may also stand below lines of
+other text, above a row of units, and be parted by bars or spaces: see `csv_layout`. The file is
+read as a stream and its numbers by numpy, so memory is that of the numbers. Only when numpy
+refuses, or reads something that is not finite, is the file gone through once more to name the
+first bad cell.
 """
 
 import csv
@@ -13,7 +14,7 @@ import io
 import math
 import re
 from array import array
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from functools import partial
 from itertools import chain, islice
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 
 from .csv_layout import Layout, find_layout
 from .errors import MeasurementError
+from .time_of_day import SecondsFromFirst, is_time_of_day
 
 LARGEST_FILE = 200_000_000
 """Longest file that is read, bytes."""
@@ -43,6 +45,7 @@ LONGEST_TITLE = 200
 _HEAD = 65_536
 _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x19\x1b-\x1f]")
 _NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
+_DIGITS = re.compile(r"\s*[+-]?[\d.,]*\d[\d.,]*([eE][+-]?\d+)?\s*", re.ASCII)
 _TITLE = re.compile(r"\s*(?P<name>[^\[\]()]*?)\s*(?:[\[(]\s*(?P<unit>[^\[\]]*?)\s*[\])])?\s*")
 _GAPS = ("", "nan", "-nan", "n/a", "null")
 _MARKS = (
@@ -57,6 +60,7 @@ class CsvTable:
     """The header of a text file and, on demand, the numbers below it.
 
     header : texts of the header's cells, trailing empty ones left off
+    clocks : the columns of times of day, whose numbers are s from the first
     Raises MeasurementError naming the file, the line and the column, with the remedy.
     """
 
@@ -68,6 +72,8 @@ class CsvTable:
         self._delimiter, self._spaces = layout.delimiter, layout.spaces
         self._header_line, self.header = layout.line, layout.titles
         self._blank = self._delimiter + " \t\r\n\x1a\ufeff"
+        self.clocks: frozenset[int] = frozenset()
+        self.clocks = self._find_clocks()
 
     def numbers(self, columns: Sequence[int]) -> NDArray[np.float64]:
         """The numbers of some columns, (samples, len(columns)), all finite."""
@@ -132,14 +138,17 @@ class CsvTable:
         with suppress(MeasurementError):
             return self.numbers(columns), {}
         numbers, bad = array("d"), {}
-        for line, text in self._rows(columns):
+        for line, text in self._rows(columns, bad):
             cells = text.split(self._delimiter)
             try:
                 if "_" in text:  # Python takes 1_000 for a number
                     raise ValueError
                 row = [float(cells[column]) for column in columns]
             except ValueError:
-                row = [self._number_or_gap(column, line, text, bad) for column in columns]
+                row = [
+                    math.nan if column in bad else self._number_or_gap(column, line, text, bad)
+                    for column in columns
+                ]
             numbers.extend(row)
         return np.frombuffer(numbers, dtype=np.float64).reshape(-1, len(columns)), bad
 
@@ -149,7 +158,7 @@ class CsvTable:
         cell = text.split(self._delimiter)[column].strip()
         if _NUMBER.fullmatch(cell):
             return float(cell)
-        if cell.lower() not in _GAPS and column not in bad:
+        if cell.lower() not in _GAPS:
             bad[column] = self._bad_cell([column], line, text)
         return math.nan
 
@@ -222,24 +231,51 @@ class CsvTable:
             )
         return layout
 
-    def _rows(self, used: Sequence[int]) -> Generator[tuple[int, str], None, None]:
-        """Line number and text of every row with data, quotes and decimal commas resolved."""
+    def _find_clocks(self) -> frozenset[int]:
+        """The columns whose first cell is a time of day; what is wrong there is told later."""
+        with suppress(MeasurementError), closing(self._rows([])) as rows:
+            _, text = next(rows, (0, ""))
+            cells = text.split(self._delimiter)[: len(self.header)]
+            return frozenset(index for index, cell in enumerate(cells) if is_time_of_day(cell))
+        return frozenset()
+
+    def _rows(
+        self, used: Sequence[int], bad: dict[int, MeasurementError] | None = None
+    ) -> Generator[tuple[int, str], None, None]:
+        """Line number and text of every row with data, quotes and decimal commas resolved.
+
+        used : columns whose cells must be clear
+        bad : takes the first error of each of them, in place of an exception; None for exceptions
+        """
         delimiter, blank, width = self._delimiter, self._blank, len(self.header)
         commas = delimiter != ","
+        clocks = {index: SecondsFromFirst() for index in self.clocks}
         for number, line in self._lines():
             if number <= self._header_line or not line.strip(blank):
                 continue
             if self._spaces:
                 line = f"{' '.join(line.split())}\n"
             if '"' in line:
-                line = self._unquoted(number, line, used)
+                line = self._unquoted(number, line, used, bad)
             if commas and "," in line:
-                line = self._pointed(number, line, used)
+                line = self._pointed(number, line, used, bad)
             if line.count(delimiter) != width - 1:
                 self._require_width(number, line)
+            if clocks:
+                line = self._counted(line, clocks)
             yield number, line
 
-    def _unquoted(self, number: int, line: str, used: Sequence[int]) -> str:
+    def _counted(self, line: str, clocks: Mapping[int, SecondsFromFirst]) -> str:
+        """A line with seconds for its times of day."""
+        cells = line.rstrip("\n").split(self._delimiter)
+        for index, clock in clocks.items():
+            seconds = clock.of(cells[index])
+            cells[index] = cells[index] if seconds is None else f"{seconds:.9f}"
+        return self._delimiter.join(cells) + "\n"
+
+    def _unquoted(
+        self, number: int, line: str, used: Sequence[int], bad: dict[int, MeasurementError] | None
+    ) -> str:
         """A line with its quotes taken off; a comma between quotes would be an ambiguous number."""
         try:
             cells = next(csv.reader([line.rstrip("\n")], delimiter=self._delimiter, strict=True))
@@ -249,27 +285,49 @@ class CsvTable:
             ) from error
         for index, cell in enumerate(cells):
             if self._delimiter in cell:
-                if index in used:
-                    raise self._bad_number(
-                        number, index, cell, "write numbers with a decimal point and no other sign"
-                    )
+                remedy = "write numbers with a decimal point and no other sign"
+                self._unclear(number, index, cell, remedy, used, bad)
                 cells[index] = ""
         return self._delimiter.join(cells) + "\n"
 
-    def _pointed(self, number: int, line: str, used: Sequence[int]) -> str:
-        """A line with decimal points for its decimal commas, if it has no points already."""
-        if "." in line:
-            cells = line.split(self._delimiter)
-            for index in used:
-                if index < len(cells) and "." in cells[index]:
-                    raise self._bad_number(
-                        number,
-                        index,
-                        cells[index],
-                        "the line mixes decimal commas and points; write one of them and no"
-                        " thousands separators",
-                    )
-        return line.replace(",", ".")
+    def _pointed(
+        self, number: int, line: str, used: Sequence[int], bad: dict[int, MeasurementError] | None
+    ) -> str:
+        """A line with decimal points for its decimal commas; a number with a point beside them may
+        have it for its thousands.
+        """
+        if "." not in line:
+            return line.replace(",", ".")
+        cells = line.rstrip("\n").split(self._delimiter)
+        if not any("," in cell and _DIGITS.fullmatch(cell) for cell in cells):
+            return line  # commas in texts alone
+        for index, cell in enumerate(cells):
+            if "." in cell and _DIGITS.fullmatch(cell) and ("," in cell or cell.count(".") == 1):
+                remedy = (
+                    "the line mixes decimal commas and points; write one of them and no thousands"
+                    " separators"
+                )
+                self._unclear(number, index, cell, remedy, used, bad)
+                cell = ""
+            cells[index] = cell.replace(",", ".")
+        return self._delimiter.join(cells) + "\n"
+
+    def _unclear(
+        self,
+        number: int,
+        index: int,
+        cell: str,
+        remedy: str,
+        used: Sequence[int],
+        bad: dict[int, MeasurementError] | None,
+    ) -> None:
+        """Refuse a cell that is used, or note that its column has such a one."""
+        if index not in used:
+            return
+        error = self._bad_number(number, index, cell, remedy)
+        if bad is None:
+            raise error
+        bad.setdefault(index, error)
 
     def _require_width(self, number: int, line: str) -> None:
         """Refuse a row with another number of cells than the header; empty ones may trail."""

@@ -21,7 +21,9 @@ WIDEST = 64
 LONGEST_TEXT = 200
 """Longest name, unit or comment that is kept, characters."""
 
-_TIME = re.compile(r"(time|t|zeit|temps|timestamps?|time_?s(ec)?|abtastzeit)", re.IGNORECASE)
+_TIME = re.compile(
+    r"(time|t|zeit|uhrzeit|temps|timestamps?|time_?s(ec)?|abtastzeit)", re.IGNORECASE
+)
 _SHOWN = 5
 
 

@@ -63,7 +63,7 @@ def apply(
     Raises MeasurementError naming the file, the column and the remedy.
     """
     source, found = table.source, _found(mapping, table)
-    clocks = _Clocks(table, found.pop("time", None))
+    clocks = _Clocks(table, found.pop("time", None), mapping.step)
     if not found:
         raise MeasurementError(f"{source}: the mapping names no channel besides time; map some.")
     warnings = list(table.warnings)
@@ -72,7 +72,13 @@ def apply(
         for entry, index in found.values()
     ]
     warnings += clocks.warnings
-    time = _common_time(series, mapping.step, source, warnings)
+    if clocks.assumed:
+        warnings.append(
+            f"The file tells no time; its samples were taken every {mapping.step:g} s, as the"
+            " mapping says."
+        )
+    step = None if clocks.assumed else mapping.step
+    time = _common_time(series, step, source, warnings)
     require_samples(time.size, source)
     warnings += doubtful_time(time)
     values = {}
@@ -113,10 +119,14 @@ def _found(mapping: ChannelMapping, table: Table) -> dict[str, tuple[MappedColum
 
 
 class _Clocks:
-    """The times of the columns, s, each read and checked once."""
+    """The times of the columns, s, each read and checked once.
 
-    def __init__(self, table: Table, mapped: tuple[MappedColumn, int] | None):
-        self._table = table
+    step : time between the samples where nothing in the file tells any time, s
+    assumed : whether it was needed
+    """
+
+    def __init__(self, table: Table, mapped: tuple[MappedColumn, int] | None, step: float | None):
+        self._table, self._step, self.assumed = table, step, False
         self._entry, self._index = mapped or (None, -1)
         self._read: dict[object, Array] = {}
         self.warnings: list[str] = []
@@ -133,7 +143,14 @@ class _Clocks:
             return self._kept(own, lambda: self._own(index))
         if alike:
             return self._kept("mapped", self._mapped)
-        remedy = "map the column that holds it as time"
+        step, untimed = self._step, all(c.clock is None and c.step is None for c in columns)
+        if step is not None and untimed and mapped is None:
+            self.assumed = True
+            return self._kept(one.samples, lambda: step * np.arange(one.samples, dtype=float))
+        remedy = (
+            'map the column that holds it as time, or write as "step" of the mapping how many'
+            " seconds lie between samples if no column does"
+        )
         if mapped is not None:
             remedy = (
                 f"{mapped.name}, which is mapped as time, has {mapped.samples} samples and this"

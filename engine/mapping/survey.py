@@ -67,5 +67,5 @@ def survey(table: Table) -> Survey:
             " columns' names on one line and a row of numbers a sample."
         )
     found = guess(columns, known, clocks_told=table.kind != CSV)
-    doubts = (*table.warnings, *bad)
+    doubts = tuple(dict.fromkeys((*table.warnings, *bad)))
     return Survey(table.source, table.kind, told_apart(columns), known, found, doubts)

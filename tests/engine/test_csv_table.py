@@ -289,6 +289,38 @@ def test_empty_cells_are_gaps_and_other_text_spoils_its_column_alone():
     assert "line 3, column c: 'x' is not a number" in str(bad[2])
 
 
+def test_dates_and_remarks_spoil_their_own_column_alone():
+    """Of a German file: numbers with commas, a date, a quoted remark, a number with both signs."""
+    text = 't;Datum;z;Text;F\n0,5;12.03.2024;1,5;"los; ab";1,5\n1,0;12.03.2024;2,5;a, b;1.234,5\n'
+    numbers, bad = table_of(text).with_gaps(range(5))
+    np.testing.assert_array_equal(numbers[:, [0, 2]], [[0.5, 1.5], [1.0, 2.5]])
+    assert {column: str(error)[9:].split(" is not")[0] for column, error in bad.items()} == {
+        1: "line 2, column Datum: '12.03.2024'",
+        3: "line 2, column Text: 'los; ab'",
+        4: "line 3, column F: '1.234,5'",
+    }
+    np.testing.assert_array_equal(table_of("t;a\n0.5;los, ab\n").numbers([0]), [[0.5]])
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ("23:59:59,75", "0:00:00,25"),
+        ("12:00:00", "12:00:00.5"),
+        ("2024-02-29T23:59:59.750Z", "2024-03-01T00:00:00.250Z"),
+        ("31.12.2023 23:59:59,75", "01.01.2024 00:00:00,25"),
+    ],
+)
+def test_times_of_day_count_from_the_first(first, second):
+    """Half a second later, over midnight, too; beside decimal commas and points."""
+    for number in ("1,5", "1.5"):
+        table = table_of(f"Messung 7\nUhrzeit;z\n{first};{number}\n{second};{number}\n")
+        assert (table.header, table.clocks) == (["Uhrzeit", "z"], {0})
+        np.testing.assert_array_equal(table.numbers([0, 1]), [[0.0, 1.5], [0.5, 1.5]])
+    with pytest.raises(MeasurementError, match="line 3, column Uhrzeit: '24. May' is not a number"):
+        table_of(f"Uhrzeit;z\n{first};1\n24. May;2\n").numbers([0])
+
+
 def test_a_number_with_underscores_is_no_number():
     _, bad = table_of("a,b\n1,2\n2,1_0\n").with_gaps([0, 1])
     assert "line 3, column b: '1_0' is not a number" in str(bad[1])
