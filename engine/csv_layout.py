@@ -150,9 +150,10 @@ def _units(names: list[str], cells: list[str]) -> bool:
         return False
     if any(not name or _NUMBER.fullmatch(name) for name in names):
         return False
-    # A lone 1 or - may be a unit, but not all of them.
-    texts = [cell for cell in filled if not _NUMBER.fullmatch(cell)]
-    return bool(texts) and all(_is_unit(cell) for cell in filled)
+    # A 1 or - may be a unit, but a first sample may read 1;-;- just as well.
+    numbers = [cell for cell in filled if _NUMBER.fullmatch(cell)]
+    words = [cell for cell in filled if cell.strip("[]()- ") and cell not in numbers]
+    return bool(words or not numbers) and all(_is_unit(cell) for cell in filled)
 
 
 def _is_unit(cell: str) -> bool:

@@ -279,6 +279,17 @@ def test_a_spoilt_first_row_is_no_header():
         assert f"line 2, column {column}" in said
 
 
+def test_a_first_row_of_dashes_is_a_sample():
+    """A logger's dash for nothing measured; a row of units has one unit at least."""
+    table = table_of("t,a,b\n1,-,-\n2,3,4\n")
+    assert table.header == ["t", "a", "b"]
+    numbers, bad = table.with_gaps([0, 1, 2])
+    np.testing.assert_array_equal(numbers, [[1.0, np.nan, np.nan], [2.0, 3.0, 4.0]])
+    assert not bad
+    assert table_of("t,a,b\n-,-,-\n2,3,4\n").count() == 1
+    assert table_of("t,a,b\ns,-,1\n2,3,4\n").header == ["t [s]", "a", "b [1]"]
+
+
 def test_empty_cells_are_gaps_and_other_text_spoils_its_column_alone():
     """Three columns in one pass: whole, with gaps, with a word."""
     text = "a,b,c\n1,2,3\n2,,x\n3,NaN,1_0\n4,5,6\n"
