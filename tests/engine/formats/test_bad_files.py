@@ -21,6 +21,7 @@ from ridetune.engine.errors import MeasurementError
 from ridetune.engine.formats import readers
 from ridetune.engine.formats.child import Bounds
 from ridetune.engine.formats.confine import landlock_version
+from ridetune.engine.formats.hdf5 import Hdf5File
 from ridetune.engine.formats.opening import opened
 from ridetune.engine.formats.syscalls import filtered
 from ridetune.engine.measurement import parse_run
@@ -237,6 +238,21 @@ def test_hdf5_never_leads_elsewhere(tmp_path, put, said):
     path = only(tmp_path, put)
     assert path.stat().st_size < 10_000
     assert said in refusal(path)
+
+
+def test_a_strange_attribute_spoils_nothing(tmp_path):
+    def strange(file):
+        column = file.create_dataset("x", data=np.arange(5.0))
+        column.attrs["MATLAB_class"] = np.arange(3)
+        column.attrs.create("unit", b"V" * 20_000, dtype="S20000")
+        column.attrs["units"] = h5py.Empty("f8")
+        column.attrs["Unit"] = "mm"
+        text = file.create_dataset("t", data=np.arange(5, dtype=np.uint16))
+        text.attrs["MATLAB_class"] = np.bytes_("char")
+
+    table = Hdf5File(only(tmp_path, strange), "r.h5", "HDF5")
+    assert [(column.name, column.unit) for column in table.columns] == [("x", "mm")]
+    assert "t is text" in table.warnings[0]
 
 
 def test_an_hdf5_bomb_is_refused_by_what_it_declares(tmp_path):
