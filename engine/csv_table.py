@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .csv_layout import Layout, find_layout
-from .errors import MeasurementError
+from .errors import MeasurementError, UnmappedError
 from .time_of_day import SecondsFromFirst, is_time_of_day
 
 LARGEST_FILE = 200_000_000
@@ -350,20 +350,26 @@ class CsvTable:
         )
 
     def _bad_cell(self, columns: Sequence[int], line: int, text: str) -> MeasurementError:
-        """The sentence about the first cell of a line that holds no finite number."""
+        """The sentence about the first cell of a line that holds no finite number; UnmappedError
+        for a gap.
+        """
         cells = text.split(self._delimiter)
         uneven = "(samples need not be evenly spaced)"
         for index in columns:
             cell = cells[index].strip()
             if not cell:
-                return self._refuse(
+                said = self._refuse(
                     f", column {self._title(index)}: the cell is empty; fill it or remove the line"
                     f" {uneven}",
                     line,
                 )
-            if cell.lower().lstrip("+-") in ("nan", "inf", "infinity"):
-                remedy = f"repair it or remove the line {uneven}"
-                return self._bad_number(line, index, cell, remedy, "not finite")
+                return UnmappedError(str(said))
+            bare, remedy = cell.lower().lstrip("+-"), f"repair it or remove the line {uneven}"
+            if bare in ("nan", "inf", "infinity"):
+                said = self._bad_number(line, index, cell, remedy, "not finite")
+                return UnmappedError(str(said)) if bare == "nan" else said
+            if cell.lower() in _GAPS:
+                return UnmappedError(str(self._bad_number(line, index, cell, remedy)))
             if not _NUMBER.fullmatch(cell):
                 return self._bad_number(line, index, cell, "write a plain decimal number")
             if math.isinf(float(cell)):

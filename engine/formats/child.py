@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import MeasurementError
+from ..errors import MeasurementError, UnmappedError
 from . import wire
 from .envelope import Envelope
 from .listing import MOST_COLUMNS, MOST_SAMPLES, plain
@@ -177,7 +177,8 @@ class ChildTable(Table):
         except (wire.Ended, OSError) as error:
             raise self._refused(self._why_ended()) from error
         if "error" in head:
-            raise MeasurementError(_sentence(head["error"], self.source))
+            error = UnmappedError if head.get("unmapped") is True else MeasurementError
+            raise error(_sentence(head["error"], self.source))
         return head, arrays
 
     def _why_ended(self) -> str:

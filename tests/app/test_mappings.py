@@ -4,6 +4,8 @@ import json
 
 import numpy as np
 import pytest
+from ridetune.app.recordings import parse, recorded, survey
+from ridetune.engine.mapping.mapping import mapping_to_json
 from ridetune.engine.measurement import read_run
 
 from .conftest import SAMPLES, short_recording
@@ -26,6 +28,22 @@ def foreign(step: int = STEP, turned: tuple[str, ...] = ()) -> bytes:
     rows = np.transpose([*columns, np.full_like(columns[0], 3.0)])
     lines = [";".join(titles), *(";".join(f"{x:.12g}" for x in row) for row in rows)]
     return "\n".join(lines).encode()
+
+
+def test_a_file_of_ours_with_gaps_or_a_slip_is_kept_until_it_is_mapped():
+    """What is proposed for it can be applied."""
+    lines = ["time [s],chassis.z [mm],chasis.pitch [deg]", "0,1,2", "0.01,,2"]
+    lines += [f"{k / 100},{k % 7},{k % 5}" for k in range(2, 50)]
+    found = recorded("\n".join(lines).encode(), "lap.csv").summary
+    assert found["needs_mapping"] is True
+    assert "did you mean chassis.pitch?" in found["warnings"][0]
+    lines[0] = "time [s],chassis.z [mm],chassis.pitch [deg]"
+    data = "\n".join(lines).encode()
+    found = recorded(data, "lap.csv").summary
+    assert found["needs_mapping"] is True
+    assert "line 3, column chassis.z [mm]: the cell is empty" in found["warnings"][0]
+    run = parse(data, "lap.csv", mapping=mapping_to_json(survey(data, "lap.csv").guess.mapping))
+    assert run.columns == ["chassis.z", "chassis.pitch"]
 
 
 @pytest.fixture
