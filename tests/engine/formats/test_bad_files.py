@@ -21,7 +21,9 @@ from ridetune.engine.errors import MeasurementError
 from ridetune.engine.formats import readers
 from ridetune.engine.formats.child import Bounds
 from ridetune.engine.formats.confine import landlock_version
+from ridetune.engine.formats.erg import ErgFile
 from ridetune.engine.formats.hdf5 import Hdf5File
+from ridetune.engine.formats.kinds import ERG_ZIP
 from ridetune.engine.formats.opening import opened
 from ridetune.engine.formats.syscalls import filtered
 from ridetune.engine.measurement import parse_run
@@ -268,6 +270,18 @@ def test_a_parquet_bomb_is_refused_by_what_it_declares(tmp_path):
     pq.write_table(runs, tmp_path / "r.parquet", compression="zstd")
     assert (tmp_path / "r.parquet").stat().st_size < 1_000_000
     assert "x declares more than 25000000 samples" in refusal(tmp_path / "r.parquet")
+
+
+def test_a_carmaker_bomb_is_refused_by_what_it_declares(tmp_path, monkeypatch):
+    """Before a byte of the recording is unpacked: here of one packed in an unknown way."""
+    monkeypatch.setattr("ridetune.engine.formats.erg.MOST_SAMPLES", 49)
+    files.erg_zip(tmp_path / "r.zip")
+    data = bytearray((tmp_path / "r.zip").read_bytes())
+    for at in (8, data.index(b"PK\x01\x02") + 10):  # the method of the first member
+        data[at : at + 2] = b"\x63\x00"
+    path = held(tmp_path, "bomb.zip", bytes(data))
+    with pytest.raises(MeasurementError, match="24 bytes make 50 samples, more than 49; cut the"):
+        ErgFile(path, "bomb.zip", ERG_ZIP)
 
 
 def test_a_spectrum_is_named(tmp_path):
