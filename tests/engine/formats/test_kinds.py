@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+import pyuff
 from asammdf import MDF, Signal
 from nptdms import ChannelObject, TdmsWriter
 from numpy.testing import assert_allclose
@@ -128,6 +129,30 @@ def test_the_run_is_cut_to_what_its_clocks_share(tmp_path):
     assert 0.205 <= run.time[0] < 0.215
     assert run.time[-1] == pytest.approx(1.0)
     assert any("cut to the time its clocks share, from 0.205 to 1 s" in w for w in run.warnings)
+
+
+def test_universal_files_are_in_the_units_of_their_data_set_164(tmp_path):
+    """Of a file in mm and mN, whose factors are file units over SI; an axis that states its unit
+    goes before.
+    """
+    path = tmp_path / "r.uff"
+    file = pyuff.UFF(str(path))
+    units = {"units_code": 5, "length": 1000.0, "force": 1000.0, "temp": 1.0, "temp_offset": 273.15}
+    files.write_set(file, {"type": 164, **units})
+    columns = [("z", 8, ""), ("a", 12, ""), ("f", 13, ""), ("mm", 8, "mm"), ("m", 8, "m")]
+    for name, kind, label in columns:
+        head = {"type": 58, "func_type": 1, "rsp_node": 1, "rsp_dir": 3, "ref_node": 0}
+        axes = {"ordinate_axis_units_lab": label, "ordinate_spec_data_type": kind}
+        head |= {"ref_dir": 0, "id1": name, "abscissa_spec_data_type": 17, "binary": 0}
+        head |= {"orddenom_spec_data_type": 0, "abscissa_axis_units_lab": "s"}
+        data = {"x": files.TIME, "data": files.Z, "abscissa_spacing": 1}
+        files.write_set(file, head | axes | data)
+    with ChildTable(path, "r.uff") as table:
+        assert [one.unit for one in table.columns] == ["m", "m/s^2", "N", "mm", "m"]
+        for index, factor in enumerate((1e-3, 1e-3, 1e-3, 1.0, 1.0)):
+            assert_allclose(table.values(index), factor * files.Z, atol=factor * 5.1e-11)
+        [said] = table.warnings
+    assert said.startswith("m is in m by its axis, but in 0.001 m by the file's units")
 
 
 BEGIN = np.datetime64("2024-03-12T10:00:00.000000")
