@@ -360,6 +360,9 @@ def test_a_plausible_magnitude_is_not_questioned(title, peak):
 def test_a_doubtful_time_is_questioned():
     run = parse({"time [s]": 1000 * TIME, "chassis.z [m]": 0.01 * WAVE})
     assert run.warnings == ("time advances by 10 s a sample; is it in ms?",)
+    # 10,000 samples a second without a unit.
+    run = parse({"time": 10 * TIME, "chassis.z [m]": 0.01 * WAVE})
+    assert run.warnings[-1] == "time advances by 0.1 s a sample; is it in ms?"
 
 
 # --- identification ---------------------------------------------------------------------------
