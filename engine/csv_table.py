@@ -23,6 +23,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from .csv_encoding import find_encoding
 from .csv_layout import Layout, find_layout
 from .errors import MeasurementError, UnmappedError
 from .time_of_day import SecondsFromFirst, is_time_of_day
@@ -42,18 +43,15 @@ LONGEST_LINE = 100_000
 LONGEST_TITLE = 200
 """Longest title of a column that is taken apart, characters."""
 
-_HEAD = 65_536
-_CONTROL = re.compile(rb"[\x00-\x08\x0e-\x19\x1b-\x1f]")
 _NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
 _DIGITS = re.compile(r"\s*[+-]?[\d.,]*\d[\d.,]*([eE][+-]?\d+)?\s*", re.ASCII)
+_WITH_COMMA = re.compile(r"\s*[+-]?\d+,\d+([eE][+-]?\d+)?\s*", re.ASCII)
+_THOUSANDS = re.compile(r"\s*[+-]?[1-9]\d{0,2},\d{3}\s*", re.ASCII)
+_LOOKED_AT = 1000
+"""Lines that are looked at for what a comma between quotes is."""
+
 _TITLE = re.compile(r"\s*(?P<name>[^\[\]()]*?)\s*(?:[\[(]\s*(?P<unit>[^\[\]]*?)\s*[\])])?\s*")
 _GAPS = ("", "nan", "-nan", "n/a", "null", "-", "--", "---")
-_MARKS = (
-    (b"\xff\xfe\x00\x00", "utf-32"),
-    (b"\x00\x00\xfe\xff", "utf-32"),
-    (b"\xff\xfe", "utf-16"),
-    (b"\xfe\xff", "utf-16"),
-)
 
 
 class CsvTable:
@@ -67,11 +65,12 @@ class CsvTable:
     def __init__(self, stream: BinaryIO, source: str):
         self._stream = stream
         self._source = source
-        self._encoding = self._find_encoding()
+        self._encoding = find_encoding(stream, source)
         layout = self._layout()
         self._delimiter, self._spaces = layout.delimiter, layout.spaces
         self._header_line, self.header = layout.line, layout.titles
         self._blank = self._delimiter + " \t\r\n\x1a\ufeff"
+        self._quoted_decimals = self._delimiter == "," and self._find_quoted_decimals()
         self.clocks: frozenset[int] = frozenset()
         self.clocks = self._find_clocks()
 
@@ -178,31 +177,13 @@ class CsvTable:
         place = f"{self._source}: " if line is None else f"{self._source}: line {line}"
         return MeasurementError(f"{place}{sentence}.")
 
-    def _find_encoding(self) -> str:
-        self._stream.seek(0)
-        head = self._stream.read(_HEAD)
-        if not head.strip():
-            raise self._refuse("the file is empty; export the recording again")
-        for mark, encoding in _MARKS:
-            if head.startswith(mark):
-                return encoding
-        if head.count(0) > 0.3 * len(head) and not _CONTROL.search(head.replace(b"\0", b"")):
-            return "utf-16-le" if head[1::2].count(0) > head[0::2].count(0) else "utf-16-be"
-        if head.startswith(b"PK\x03\x04"):
-            raise self._refuse(
-                "this is a workbook or a zip archive, not text; save the sheet as CSV"
-            )
-        if _CONTROL.search(head):
-            raise self._refuse("this is a binary file, not text; export the recording as CSV")
-        return "utf-8-sig"
-
     def _text(self) -> io.TextIOWrapper:
         self._stream.seek(0)
         strict = self._encoding == "utf-8-sig"
         errors = "surrogateescape" if strict else "replace"
         return io.TextIOWrapper(self._stream, self._encoding, errors, newline=None)
 
-    def _lines(self) -> Iterator[tuple[int, str]]:
+    def _lines(self) -> Generator[tuple[int, str], None, None]:
         """Every line of the file with its number, counted from 1."""
         text = self._text()
         try:
@@ -213,7 +194,7 @@ class CsvTable:
                         " a sample",
                         number,
                     )
-                yield number, line
+                yield number, line.replace("\u2212", "-")
         finally:
             text.detach()
 
@@ -276,7 +257,9 @@ class CsvTable:
     def _unquoted(
         self, number: int, line: str, used: Sequence[int], bad: dict[int, MeasurementError] | None
     ) -> str:
-        """A line with its quotes taken off; a comma between quotes would be an ambiguous number."""
+        """A line with its quotes taken off; a separator between quotes is no part of a number,
+        unless it is a decimal comma.
+        """
         try:
             cells = next(csv.reader([line.rstrip("\n")], delimiter=self._delimiter, strict=True))
         except csv.Error as error:
@@ -285,10 +268,26 @@ class CsvTable:
             ) from error
         for index, cell in enumerate(cells):
             if self._delimiter in cell:
+                if self._quoted_decimals and _WITH_COMMA.fullmatch(cell):
+                    cells[index] = cell.replace(",", ".")
+                    continue
                 remedy = "write numbers with a decimal point and no other sign"
                 self._unclear(number, index, cell, remedy, used, bad)
                 cells[index] = ""
         return self._delimiter.join(cells) + "\n"
+
+    def _find_quoted_decimals(self) -> bool:
+        """Whether commas part the columns, and between quotes are decimal ones: one of the first
+        numbers can be nothing else (0,5 but not 1,250), and none has a point.
+        """
+        clear = False
+        with suppress(MeasurementError, csv.Error), closing(self._lines()) as lines:
+            below = (line for number, line in lines if number > self._header_line)
+            for cell in chain.from_iterable(csv.reader(islice(below, _LOOKED_AT), strict=True)):
+                if _DIGITS.fullmatch(cell) and ("." in cell or cell.count(",") > 1):
+                    return False
+                clear |= bool(_WITH_COMMA.fullmatch(cell) and not _THOUSANDS.fullmatch(cell))
+        return clear
 
     def _pointed(
         self, number: int, line: str, used: Sequence[int], bad: dict[int, MeasurementError] | None

@@ -86,6 +86,19 @@ def test_a_degree_sign_written_by_windows_is_understood():
     assert table_of("time [s],pitch [°]\n0,1\n".encode("cp1252")).header[1] == "pitch [°]"
 
 
+def test_decimal_commas_between_quotes_are_told_from_thousands():
+    """1,250 may be either; beside 0,5 it is a decimal, beside 1.5 or alone it is refused."""
+    text = 't,z\n"0,000","1,250"\n"0,5","-1,5"\n'
+    np.testing.assert_array_equal(read(text), [[0.0, 1.25], [0.5, -1.5]])
+    for text in ('t,z\n1,"1,250"\n2,"3,500"\n', 't,z\n1.5,"1,250"\n2.5,"1,5"\n'):
+        assert "line 2, column z: '1,250' is not a number" in refusal(text)
+    assert "'1,234,567' is not a number" in refusal('t,z\n1,"1,234,567"\n2,"1,5"\n')
+
+
+def test_a_typographic_minus_is_a_minus():
+    np.testing.assert_array_equal(read("t;z\n0;\u22121,5\n1;2e\u22123\n"), [[0, -1.5], [1, 2e-3]])
+
+
 def test_text_in_a_column_that_is_not_used_does_no_harm():
     content = PLAIN.replace("-12.0", '"wet, ""cold"""')
     np.testing.assert_array_equal(table_of(content).numbers([0, 1]), NUMBERS[:, :2])
