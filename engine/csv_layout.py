@@ -13,6 +13,8 @@ from collections.abc import Iterator
 from itertools import islice
 from typing import NamedTuple
 
+from .time_of_day import is_time_of_day
+
 MOST_LINES = 200
 """Lines of other text that may stand above the header."""
 
@@ -134,9 +136,11 @@ def _trimmed(cells: list[str]) -> list[str]:
 
 
 def _is_data(cells: list[str]) -> bool:
-    """Whether every cell that is not empty is a number, and at least two are."""
+    """Whether every cell that is not empty is a number or a time of day, and at least two are."""
     filled = [cell for cell in cells if cell]
-    return len(filled) >= 2 and all(_NUMBER.fullmatch(cell) for cell in filled)
+    return len(filled) >= 2 and all(
+        _NUMBER.fullmatch(cell) or is_time_of_day(cell) for cell in filled
+    )
 
 
 def _units(names: list[str], cells: list[str]) -> bool:
@@ -146,9 +150,10 @@ def _units(names: list[str], cells: list[str]) -> bool:
         return False
     if any(not name or _NUMBER.fullmatch(name) for name in names):
         return False
-    # A lone 1 or - may be a unit, but not all of them.
-    texts = [cell for cell in filled if not _NUMBER.fullmatch(cell)]
-    return bool(texts) and all(_is_unit(cell) for cell in filled)
+    # A 1 or - may be a unit, but a first sample may read 1;-;- just as well.
+    numbers = [cell for cell in filled if _NUMBER.fullmatch(cell)]
+    words = [cell for cell in filled if cell.strip("[]()- ") and cell not in numbers]
+    return bool(words or not numbers) and all(_is_unit(cell) for cell in filled)
 
 
 def _is_unit(cell: str) -> bool:

@@ -2,10 +2,11 @@
 
 Read are UTF-8 (with or without its mark), UTF-16 and UTF-32; commas, semicolons or tabs between
 the columns, the last two also with decimal commas; quotes, blank lines, Excel's `sep=` line and
-any line ending. The names may also stand below lines of other text, above a row of units, and be
-parted by bars or spaces: see `csv_layout`. The file is read as a stream and its numbers by numpy,
-so memory is that of the numbers. Only when numpy refuses, or reads something that is not finite,
-is the file gone through once more to name the first bad cell.
+any line ending. Times of day count in s from the first. The names may also stand below lines of
+other text, above a row of units, and be parted by bars or spaces: see `csv_layout`. The file is
+read as a stream and its numbers by numpy, so memory is that of the numbers. Only when numpy
+refuses, or reads something that is not finite, is the file gone through once more to name the
+first bad cell.
 """
 
 import csv
@@ -13,7 +14,7 @@ import io
 import math
 import re
 from array import array
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from functools import partial
 from itertools import chain, islice
@@ -22,8 +23,10 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from .csv_encoding import find_encoding
 from .csv_layout import Layout, find_layout
-from .errors import MeasurementError
+from .errors import MeasurementError, UnmappedError
+from .time_of_day import SecondsFromFirst, is_time_of_day
 
 LARGEST_FILE = 200_000_000
 """Longest file that is read, bytes."""
@@ -40,34 +43,36 @@ LONGEST_LINE = 100_000
 LONGEST_TITLE = 200
 """Longest title of a column that is taken apart, characters."""
 
-_HEAD = 65_536
-_CONTROL = re.compile(rb"[\x00-\x08\x0e-\x19\x1b-\x1f]")
 _NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
+_DIGITS = re.compile(r"\s*[+-]?[\d.,]*\d[\d.,]*([eE][+-]?\d+)?\s*", re.ASCII)
+_WITH_COMMA = re.compile(r"\s*[+-]?\d+,\d+([eE][+-]?\d+)?\s*", re.ASCII)
+_THOUSANDS = re.compile(r"\s*[+-]?[1-9]\d{0,2},\d{3}\s*", re.ASCII)
+_LOOKED_AT = 1000
+"""Lines that are looked at for what a comma between quotes is."""
+
 _TITLE = re.compile(r"\s*(?P<name>[^\[\]()]*?)\s*(?:[\[(]\s*(?P<unit>[^\[\]]*?)\s*[\])])?\s*")
-_GAPS = ("", "nan", "-nan", "n/a", "null")
-_MARKS = (
-    (b"\xff\xfe\x00\x00", "utf-32"),
-    (b"\x00\x00\xfe\xff", "utf-32"),
-    (b"\xff\xfe", "utf-16"),
-    (b"\xfe\xff", "utf-16"),
-)
+_GAPS = ("", "nan", "-nan", "n/a", "null", "-", "--", "---")
 
 
 class CsvTable:
     """The header of a text file and, on demand, the numbers below it.
 
     header : texts of the header's cells, trailing empty ones left off
+    clocks : the columns of times of day, whose numbers are s from the first
     Raises MeasurementError naming the file, the line and the column, with the remedy.
     """
 
     def __init__(self, stream: BinaryIO, source: str):
         self._stream = stream
         self._source = source
-        self._encoding = self._find_encoding()
+        self._encoding = find_encoding(stream, source)
         layout = self._layout()
         self._delimiter, self._spaces = layout.delimiter, layout.spaces
         self._header_line, self.header = layout.line, layout.titles
         self._blank = self._delimiter + " \t\r\n\x1a\ufeff"
+        self._quoted_decimals = self._delimiter == "," and self._find_quoted_decimals()
+        self.clocks: frozenset[int] = frozenset()
+        self.clocks = self._find_clocks()
 
     def numbers(self, columns: Sequence[int]) -> NDArray[np.float64]:
         """The numbers of some columns, (samples, len(columns)), all finite."""
@@ -132,14 +137,17 @@ class CsvTable:
         with suppress(MeasurementError):
             return self.numbers(columns), {}
         numbers, bad = array("d"), {}
-        for line, text in self._rows(columns):
+        for line, text in self._rows(columns, bad):
             cells = text.split(self._delimiter)
             try:
                 if "_" in text:  # Python takes 1_000 for a number
                     raise ValueError
                 row = [float(cells[column]) for column in columns]
             except ValueError:
-                row = [self._number_or_gap(column, line, text, bad) for column in columns]
+                row = [
+                    math.nan if column in bad else self._number_or_gap(column, line, text, bad)
+                    for column in columns
+                ]
             numbers.extend(row)
         return np.frombuffer(numbers, dtype=np.float64).reshape(-1, len(columns)), bad
 
@@ -149,7 +157,7 @@ class CsvTable:
         cell = text.split(self._delimiter)[column].strip()
         if _NUMBER.fullmatch(cell):
             return float(cell)
-        if cell.lower() not in _GAPS and column not in bad:
+        if cell.lower() not in _GAPS:
             bad[column] = self._bad_cell([column], line, text)
         return math.nan
 
@@ -169,31 +177,13 @@ class CsvTable:
         place = f"{self._source}: " if line is None else f"{self._source}: line {line}"
         return MeasurementError(f"{place}{sentence}.")
 
-    def _find_encoding(self) -> str:
-        self._stream.seek(0)
-        head = self._stream.read(_HEAD)
-        if not head.strip():
-            raise self._refuse("the file is empty; export the recording again")
-        for mark, encoding in _MARKS:
-            if head.startswith(mark):
-                return encoding
-        if head.count(0) > 0.3 * len(head) and not _CONTROL.search(head.replace(b"\0", b"")):
-            return "utf-16-le" if head[1::2].count(0) > head[0::2].count(0) else "utf-16-be"
-        if head.startswith(b"PK\x03\x04"):
-            raise self._refuse(
-                "this is a workbook or a zip archive, not text; save the sheet as CSV"
-            )
-        if _CONTROL.search(head):
-            raise self._refuse("this is a binary file, not text; export the recording as CSV")
-        return "utf-8-sig"
-
     def _text(self) -> io.TextIOWrapper:
         self._stream.seek(0)
         strict = self._encoding == "utf-8-sig"
         errors = "surrogateescape" if strict else "replace"
         return io.TextIOWrapper(self._stream, self._encoding, errors, newline=None)
 
-    def _lines(self) -> Iterator[tuple[int, str]]:
+    def _lines(self) -> Generator[tuple[int, str], None, None]:
         """Every line of the file with its number, counted from 1."""
         text = self._text()
         try:
@@ -204,7 +194,7 @@ class CsvTable:
                         " a sample",
                         number,
                     )
-                yield number, line
+                yield number, line.replace("\u2212", "-")
         finally:
             text.detach()
 
@@ -222,25 +212,54 @@ class CsvTable:
             )
         return layout
 
-    def _rows(self, used: Sequence[int]) -> Generator[tuple[int, str], None, None]:
-        """Line number and text of every row with data, quotes and decimal commas resolved."""
+    def _find_clocks(self) -> frozenset[int]:
+        """The columns whose first cell is a time of day; what is wrong there is told later."""
+        with suppress(MeasurementError), closing(self._rows([])) as rows:
+            _, text = next(rows, (0, ""))
+            cells = text.split(self._delimiter)[: len(self.header)]
+            return frozenset(index for index, cell in enumerate(cells) if is_time_of_day(cell))
+        return frozenset()
+
+    def _rows(
+        self, used: Sequence[int], bad: dict[int, MeasurementError] | None = None
+    ) -> Generator[tuple[int, str], None, None]:
+        """Line number and text of every row with data, quotes and decimal commas resolved.
+
+        used : columns whose cells must be clear
+        bad : takes the first error of each of them, in place of an exception; None for exceptions
+        """
         delimiter, blank, width = self._delimiter, self._blank, len(self.header)
         commas = delimiter != ","
+        clocks = {index: SecondsFromFirst() for index in self.clocks}
         for number, line in self._lines():
             if number <= self._header_line or not line.strip(blank):
                 continue
             if self._spaces:
                 line = f"{' '.join(line.split())}\n"
             if '"' in line:
-                line = self._unquoted(number, line, used)
+                line = self._unquoted(number, line, used, bad)
             if commas and "," in line:
-                line = self._pointed(number, line, used)
+                line = self._pointed(number, line, used, bad)
             if line.count(delimiter) != width - 1:
                 self._require_width(number, line)
+            if clocks:
+                line = self._counted(line, clocks)
             yield number, line
 
-    def _unquoted(self, number: int, line: str, used: Sequence[int]) -> str:
-        """A line with its quotes taken off; a comma between quotes would be an ambiguous number."""
+    def _counted(self, line: str, clocks: Mapping[int, SecondsFromFirst]) -> str:
+        """A line with seconds for its times of day."""
+        cells = line.rstrip("\n").split(self._delimiter)
+        for index, clock in clocks.items():
+            seconds = clock.of(cells[index])
+            cells[index] = cells[index] if seconds is None else f"{seconds:.9f}"
+        return self._delimiter.join(cells) + "\n"
+
+    def _unquoted(
+        self, number: int, line: str, used: Sequence[int], bad: dict[int, MeasurementError] | None
+    ) -> str:
+        """A line with its quotes taken off; a separator between quotes is no part of a number,
+        unless it is a decimal comma.
+        """
         try:
             cells = next(csv.reader([line.rstrip("\n")], delimiter=self._delimiter, strict=True))
         except csv.Error as error:
@@ -249,27 +268,65 @@ class CsvTable:
             ) from error
         for index, cell in enumerate(cells):
             if self._delimiter in cell:
-                if index in used:
-                    raise self._bad_number(
-                        number, index, cell, "write numbers with a decimal point and no other sign"
-                    )
+                if self._quoted_decimals and _WITH_COMMA.fullmatch(cell):
+                    cells[index] = cell.replace(",", ".")
+                    continue
+                remedy = "write numbers with a decimal point and no other sign"
+                self._unclear(number, index, cell, remedy, used, bad)
                 cells[index] = ""
         return self._delimiter.join(cells) + "\n"
 
-    def _pointed(self, number: int, line: str, used: Sequence[int]) -> str:
-        """A line with decimal points for its decimal commas, if it has no points already."""
-        if "." in line:
-            cells = line.split(self._delimiter)
-            for index in used:
-                if index < len(cells) and "." in cells[index]:
-                    raise self._bad_number(
-                        number,
-                        index,
-                        cells[index],
-                        "the line mixes decimal commas and points; write one of them and no"
-                        " thousands separators",
-                    )
-        return line.replace(",", ".")
+    def _find_quoted_decimals(self) -> bool:
+        """Whether commas part the columns, and between quotes are decimal ones: one of the first
+        numbers can be nothing else (0,5 but not 1,250), and none has a point.
+        """
+        clear = False
+        with suppress(MeasurementError, csv.Error), closing(self._lines()) as lines:
+            below = (line for number, line in lines if number > self._header_line)
+            for cell in chain.from_iterable(csv.reader(islice(below, _LOOKED_AT), strict=True)):
+                if _DIGITS.fullmatch(cell) and ("." in cell or cell.count(",") > 1):
+                    return False
+                clear |= bool(_WITH_COMMA.fullmatch(cell) and not _THOUSANDS.fullmatch(cell))
+        return clear
+
+    def _pointed(
+        self, number: int, line: str, used: Sequence[int], bad: dict[int, MeasurementError] | None
+    ) -> str:
+        """A line with decimal points for its decimal commas; a number with a point beside them may
+        have it for its thousands.
+        """
+        if "." not in line:
+            return line.replace(",", ".")
+        cells = line.rstrip("\n").split(self._delimiter)
+        if not any("," in cell and _DIGITS.fullmatch(cell) for cell in cells):
+            return line  # commas in texts alone
+        for index, cell in enumerate(cells):
+            if "." in cell and _DIGITS.fullmatch(cell) and ("," in cell or cell.count(".") == 1):
+                remedy = (
+                    "the line mixes decimal commas and points; write one of them and no thousands"
+                    " separators"
+                )
+                self._unclear(number, index, cell, remedy, used, bad)
+                cell = ""
+            cells[index] = cell.replace(",", ".")
+        return self._delimiter.join(cells) + "\n"
+
+    def _unclear(
+        self,
+        number: int,
+        index: int,
+        cell: str,
+        remedy: str,
+        used: Sequence[int],
+        bad: dict[int, MeasurementError] | None,
+    ) -> None:
+        """Refuse a cell that is used, or note that its column has such a one."""
+        if index not in used:
+            return
+        error = self._bad_number(number, index, cell, remedy)
+        if bad is None:
+            raise error
+        bad.setdefault(index, error)
 
     def _require_width(self, number: int, line: str) -> None:
         """Refuse a row with another number of cells than the header; empty ones may trail."""
@@ -292,20 +349,26 @@ class CsvTable:
         )
 
     def _bad_cell(self, columns: Sequence[int], line: int, text: str) -> MeasurementError:
-        """The sentence about the first cell of a line that holds no finite number."""
+        """The sentence about the first cell of a line that holds no finite number; UnmappedError
+        for a gap.
+        """
         cells = text.split(self._delimiter)
         uneven = "(samples need not be evenly spaced)"
         for index in columns:
             cell = cells[index].strip()
             if not cell:
-                return self._refuse(
+                said = self._refuse(
                     f", column {self._title(index)}: the cell is empty; fill it or remove the line"
                     f" {uneven}",
                     line,
                 )
-            if cell.lower().lstrip("+-") in ("nan", "inf", "infinity"):
-                remedy = f"repair it or remove the line {uneven}"
-                return self._bad_number(line, index, cell, remedy, "not finite")
+                return UnmappedError(str(said))
+            bare, remedy = cell.lower().lstrip("+-"), f"repair it or remove the line {uneven}"
+            if bare in ("nan", "inf", "infinity"):
+                said = self._bad_number(line, index, cell, remedy, "not finite")
+                return UnmappedError(str(said)) if bare == "nan" else said
+            if cell.lower() in _GAPS:
+                return UnmappedError(str(self._bad_number(line, index, cell, remedy)))
             if not _NUMBER.fullmatch(cell):
                 return self._bad_number(line, index, cell, "write a plain decimal number")
             if math.isinf(float(cell)):

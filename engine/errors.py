@@ -30,7 +30,9 @@ class MeasurementError(RideError):
 
 
 class UnmappedError(MeasurementError):
-    """A measurement file's columns have other names than our channels; a mapping tells them."""
+    """A measurement file cannot be read by the names of our channels, but under a mapping: its
+    columns have others, or have no number here and there.
+    """
 
 
 class ConditioningError(RideError):

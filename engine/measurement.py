@@ -271,7 +271,7 @@ def _refuse_misspelling(index: int, title: str, found: Collection[str], source: 
     name, _ = split_title(title)
     for known in CHANNELS:
         if len(name) < 2 * len(known) and known not in found and _misspells(name, known):
-            raise MeasurementError(
+            raise UnmappedError(
                 f"{source}: column {index + 1} is called {_shortened(title)}; did you mean"
                 f" {known}? Rename it or remove it."
             )

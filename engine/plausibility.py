@@ -17,8 +17,10 @@ Array = NDArray[np.float64]
 FEWEST_SAMPLES = 10
 """Fewest samples a measurement may have."""
 
-COARSEST_STEP = 0.2
-"""Time between samples, s, from which on the unit of time is doubtful."""
+COARSEST_STEP = 0.06
+"""Time between samples, s, beyond which the unit of time is doubtful: no wheel's motion is left at
+it, and 0.1 is a step of 10,000 samples a second in ms.
+"""
 
 
 def require_samples(count: int, source: str) -> None:

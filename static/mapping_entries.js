@@ -44,7 +44,8 @@ export function entriesOf(mapping, columns) {
     }
     const { guess, candidates, stand_ins: standIns } = found[0];
     const likely = [guess, ...candidates].find((one) =>
-      one && one.channel === told.channel && one.unit === told.unit && one.reason === told.note);
+      one && one.channel === told.channel && one.unit === told.unit
+        && (one.reason === told.note || (one.doubted && one.reason.startsWith("template"))));
     const missing = told.missing ?? (standIns.length ? standIns.map(({ value }) => value) : null);
     entries.set(found[0].index, { sign: 1, gain: 1, note: "", ...told, missing,
       confidence: likely?.confidence ?? null, doubted: likely?.doubted ?? false });
@@ -73,8 +74,9 @@ export function columnsOf(entries, columns) {
 }
 
 /** Why the entry of a column is worth a look, in a word or two; "" for one that is not. */
-export function doubt({ confidence, doubted }, { unit }) {
+export function doubt({ confidence, doubted, sign, note }, { unit }) {
   if (doubted) return unit ? "unit doubted" : "unit guessed";
+  if (sign < 0 && confidence !== null && !note.startsWith("template")) return "sign turned over";
   return confidence !== null && confidence < UNSURE ? "unsure" : "";
 }
 

@@ -35,6 +35,10 @@ TIMES_NOISE = 2.0
 WINDOW = 0.3
 """Shortest standstill that is found, s."""
 
+LEVEL, CHANGE = 0.5, 0.1
+"""Where no speed is recorded: greatest mean of an acceleration along the car over WINDOW, that of a
+car on a slope of 5 %, and greatest change of it from one to the next, m/s2."""
+
 NEVER_AT_REST = ("road.", "post.", "chassis.x", "chassis.v_x", ".speed")
 """Parts of the names of channels whose rest value is theirs to keep."""
 
@@ -44,20 +48,35 @@ def has_rest_value(name: str) -> bool:
     return channel(name).quantity in QUIET and not any(part in name for part in NEVER_AT_REST)
 
 
+def speeds(run: Run) -> tuple[str, ...]:
+    """The channels of a run that tell whether the car stands."""
+    wheels = (f"wheel.{corner}.speed" for corner in CORNERS)
+    return tuple(name for name in ("chassis.v_x", *wheels) if name in run.columns)
+
+
 def standstill(run: Run) -> tuple[float, float] | None:
-    """The longest time, s, in which the car stands: v_x is near 0 and every channel is quiet."""
+    """The longest time, s, in which the car stands: every speed is near 0, every channel quiet.
+
+    Where no speed is recorded it is assumed to stand where every channel is quiet and the
+    acceleration along the car is small and steady; a smooth drive at constant speed is alike.
+    """
     window = max(3, round(WINDOW / run.sample_step))
     if window > len(run.time) or not np.isfinite(run.time).all():
         return None
     still = np.ones(len(run.time), dtype=bool)
+    for name in speeds(run):
+        still &= np.abs(run[name]) <= QUIET["speed"]
     for name in run.columns:
-        if not np.all(np.isfinite(run[name])):
+        if not has_rest_value(name) or not np.all(np.isfinite(run[name])):
             continue
-        if name == "chassis.v_x":
-            still &= np.abs(run[name]) <= QUIET["speed"]
-        elif has_rest_value(name):
-            limit = max(QUIET[channel(name).quantity], TIMES_NOISE * run.noise.get(name, 0.0))
-            still &= _scatter(run[name], window) <= limit
+        limit = max(QUIET[channel(name).quantity], TIMES_NOISE * run.noise.get(name, 0.0))
+        still &= _scatter(run[name], window) <= limit
+        if name in ("chassis.a_x", "chassis.body_a_x") and not speeds(run):
+            mean = uniform_filter1d(run[name], window, mode="nearest")
+            change = np.abs(mean[window:] - mean[:-window])
+            still &= np.abs(mean) <= LEVEL
+            still[window:] &= change <= CHANGE
+            still[:-window] &= change <= CHANGE
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
     begins, ends = edges[::2], edges[1::2] - 1
     if not begins.size:
@@ -135,11 +154,10 @@ class Rest:
             numbers[f"offset.{name}"], numbers[f"standard_error.{name}"] = offset, error
             info = channel(name)
             told.append(f"{name} {info.display_factor * offset:.3g} {info.display_unit}")
-        return Done(
-            found,
-            numbers=numbers,
-            sentences=(f"At rest from {begin:.3f} to {end:.3f} s; took off {', '.join(told)}.",),
-        )
+        sentences = [f"At rest from {begin:.3f} to {end:.3f} s; took off {', '.join(told)}."]
+        if self.interval is None and not speeds(run):
+            sentences.append("That the car stands there is assumed: no speed is recorded.")
+        return Done(found, numbers=numbers, sentences=tuple(sentences))
 
     def _interval(self, run: Run) -> tuple[float, float]:
         if self.interval is not None:
@@ -147,8 +165,8 @@ class Rest:
         found = standstill(run)
         if found is None:
             raise ConditioningError(
-                f"the car nowhere stands still for {WINDOW} s (v_x at 0 and every channel quiet); "
-                "give the interval in which it does, or leave this step out."
+                f"the car nowhere stands still for {WINDOW} s (every speed at 0, every channel "
+                "quiet); give the interval in which it does, or leave this step out."
             )
         return found
 

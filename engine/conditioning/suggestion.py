@@ -10,7 +10,7 @@ from ..filters import PAD_PERIODS, is_uniform
 from ..frames import CORNERS, Corner
 from ..spikes import spike_samples
 from ..vehicle import Vehicle
-from .calibration import Rest, standstill
+from .calibration import Rest, speeds, standstill
 from .chain import Step
 from .motion import TARGETS, Angles, Displacement, Gravity, Speed
 from .rims import RimFromTravel
@@ -117,6 +117,12 @@ class _Chain:
         if self.standing is not None and raw:
             begin, end = (round(one, 3) for one in self.standing)
             reason = f"the car stands from {begin:g} to {end:g} s, and {raw[0]} may have a bias."
+            if not speeds(self.run):
+                reason = (
+                    f"no speed is recorded; that the car stands from {begin:g} to {end:g} s, where"
+                    f" every channel is quiet, is assumed, and {raw[0]} may have a bias. Leave this"
+                    " step out where it drives smoothly there."
+                )
             self.add(Rest(interval=(begin, end)), reason)
 
     def drive(self) -> None:

@@ -5,7 +5,7 @@ from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
-from ..errors import RideError
+from ..errors import RideError, UnmappedError
 from .envelope import envelope
 from .kinds import kind_of
 from .readers import read_as
@@ -39,7 +39,7 @@ class Answering:
         try:
             return self._questions[request.pop("ask")](**request)
         except RideError as error:
-            return {"error": str(error)}, ()
+            return {"error": str(error), "unmapped": isinstance(error, UnmappedError)}, ()
         except MemoryError:
             return self._error(
                 f"reading it takes more than {self._memory / 2**30:.3g} GB of memory; cut the"

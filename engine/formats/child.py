@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import MeasurementError
+from ..errors import MeasurementError, UnmappedError
 from . import wire
 from .envelope import Envelope
 from .listing import MOST_COLUMNS, MOST_SAMPLES, plain
@@ -85,6 +85,8 @@ class ChildTable(Table):
             "cpu": bounds.cpu,
             "wall": int(10 * bounds.wall) + bounds.cpu,
             "written": WRITTEN,
+            # Beside it what the readers of CarMaker and TDMS look for.
+            "reads": [f"{path.absolute()}{ending}" for ending in ("", ".info", "_index")],
         }
         self._folder = tempfile.mkdtemp(prefix="ridetune-", dir=folder and folder.absolute())
         self._speak, theirs = socket.socketpair()
@@ -180,7 +182,8 @@ class ChildTable(Table):
         except (wire.Ended, OSError) as error:
             raise self._refused(self._why_ended()) from error
         if "error" in head:
-            raise MeasurementError(_sentence(head["error"], self.source))
+            error = UnmappedError if head.get("unmapped") is True else MeasurementError
+            raise error(_sentence(head["error"], self.source))
         return head, arrays
 
     def _why_ended(self) -> str:

@@ -8,7 +8,7 @@ from typing import BinaryIO
 
 from ..csv_table import LARGEST_FILE, CsvTable, split_title
 from ..errors import MeasurementError
-from .listing import nearest_clocks
+from .listing import means_time, nearest_clocks
 from .table import MOST_NUMBERS, Array, Column, Table
 
 
@@ -36,14 +36,19 @@ class CsvFile(Table):
         return cls(path.open("rb"), source)
 
     def titles(self) -> tuple[tuple[str, str], ...]:
-        """Name and unit of every column."""
-        return tuple(map(split_title, self._table.header))
+        """Name and unit of every column; s of times of day."""
+        parts = map(split_title, self._table.header)
+        clocks = self._table.clocks
+        return tuple((name, "s" if k in clocks else unit) for k, (name, unit) in enumerate(parts))
 
     @cached_property
     def columns(self) -> tuple[Column, ...]:  # pyright: ignore[reportIncompatibleVariableOverride]
         """Every column of the header."""
         samples, titles = self._table.count(), self.titles()
         clocks = nearest_clocks([((name,), samples) for name, _ in titles])
+        if self._table.clocks and not any(means_time(name) for name, _ in titles):
+            of_day = min(self._table.clocks)
+            clocks = [None if index == of_day else of_day for index in range(len(titles))]
         return tuple(
             Column(name, unit, samples, clock=clock)
             for (name, unit), clock in zip(titles, clocks, strict=True)

@@ -5,7 +5,6 @@ bytes, the version, the byte order (0 little, 1 big endian) and the length of a 
 be what the description says. Times are those of the quantity Time, in s.
 """
 
-import io
 import re
 import zipfile
 from collections.abc import Iterator
@@ -16,7 +15,7 @@ import numpy as np
 
 from ..errors import MeasurementError
 from .kinds import ERG_ZIP, erg_pair
-from .listing import Listing, first_text, plain
+from .listing import MOST_SAMPLES, Listing, first_text, plain
 from .table import Array, Column, Table
 
 HEAD_BYTES = 16
@@ -48,16 +47,24 @@ class ErgFile(Table):
 
     def __init__(self, path: Path, source: str, kind: str):
         self.source, self.kind, self.comment = source, "CarMaker ERG", ""
-        data, info = self._packed(path) if kind == ERG_ZIP else self._beside(path)
+        packed = kind == ERG_ZIP
+        size, info = self._packed(path) if packed else self._beside(path)
         stated = dict(_stated(info))
         order = ">" if stated.get("File.ByteOrder", "").lower().startswith("big") else "<"
         fields, factors, units = self._fields(stated, order)
         record = np.dtype(fields)
+        samples = (size - HEAD_BYTES) // max(record.itemsize, 1)
+        if samples > MOST_SAMPLES:
+            raise MeasurementError(
+                f"{source}: its records of {record.itemsize} bytes make {samples} samples, more"
+                f" than {MOST_SAMPLES}; cut the recording or give the .erg.info that was written"
+                " with it."
+            )
+        data = self._unpacked(path) if packed else np.memmap(path, np.uint8, "r")
         if data[:6].tobytes() != b"CM-ERG":
             raise MeasurementError(
                 f"{source}: this is no CarMaker recording; choose the .erg file."
             )
-        samples = (len(data) - HEAD_BYTES) // max(record.itemsize, 1)
         said = int.from_bytes(data[10:12].tobytes(), "little" if order == "<" else "big")
         if said not in (0, record.itemsize & 0xFFFF):
             raise MeasurementError(
@@ -78,7 +85,8 @@ class ErgFile(Table):
         self.columns, self.warnings = listing.columns(), listing.warnings()
         self._places = listing.places
 
-    def _beside(self, path: Path) -> tuple[Any, bytes]:
+    def _beside(self, path: Path) -> tuple[int, bytes]:
+        """Length of the recording and its description, in a file of its own."""
         info = path.with_name(f"{path.name}.info")
         if not info.is_file():
             raise MeasurementError(
@@ -86,9 +94,10 @@ class ErgFile(Table):
                 f" {self.source}.info beside it, or pack the two into one .zip and send that."
             )
         with info.open("rb") as stream:
-            return np.memmap(path, np.uint8, "r"), self._short(stream.read(LONGEST_DESCRIPTION + 1))
+            return path.stat().st_size, self._short(stream.read(LONGEST_DESCRIPTION + 1))
 
-    def _packed(self, path: Path) -> tuple[Any, bytes]:
+    def _packed(self, path: Path) -> tuple[int, bytes]:
+        """The same of an archive, whose recording is not unpacked."""
         with zipfile.ZipFile(path) as archive:
             recording, description = erg_pair(archive, self.source)
             if recording.file_size > LARGEST_UNPACKED:
@@ -96,12 +105,14 @@ class ErgFile(Table):
                     f"{self.source}: {plain(recording.filename)} unpacks to more than"
                     f" {LARGEST_UNPACKED / 1e9:g} GB; cut the recording."
                 )
-            held = io.BytesIO()
-            with archive.open(recording) as stream:
-                held.write(stream.read(recording.file_size + 1))
             with archive.open(description) as stream:
-                info = self._short(stream.read(LONGEST_DESCRIPTION + 1))
-        return np.frombuffer(held.getbuffer(), np.uint8), info
+                return recording.file_size, self._short(stream.read(LONGEST_DESCRIPTION + 1))
+
+    def _unpacked(self, path: Path) -> Any:
+        with zipfile.ZipFile(path) as archive:
+            recording, _ = erg_pair(archive, self.source)
+            with archive.open(recording) as stream:
+                return np.frombuffer(stream.read(recording.file_size), np.uint8)
 
     def _short(self, info: bytes) -> bytes:
         if len(info) > LONGEST_DESCRIPTION:

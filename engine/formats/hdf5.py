@@ -106,7 +106,7 @@ class Hdf5File(Table):
             return "is put together from other files, which are not opened"
         if created.get_external_count():
             return "is kept in another file, which is not opened"
-        if data.attrs.get("MATLAB_class") in (b"char", b"cell", "char", "cell"):
+        if self._text(data, "MATLAB_class") in ("char", "cell"):
             return "is text"
         if data.dtype.names is None and data.dtype.kind not in "iufb":
             return "holds no plain numbers"
@@ -121,9 +121,12 @@ class Hdf5File(Table):
     def _text(self, data: Any, key: str) -> str:
         if key not in data.attrs:
             return ""
-        if data.attrs.get_id(key).get_storage_size() > 10_000:
+        try:
+            if data.attrs.get_id(key).get_storage_size() > 10_000:
+                return ""
+            value = data.attrs[key]
+        except (TypeError, ValueError, OSError, RuntimeError):  # empty, or of a type unknown
             return ""
-        value = data.attrs[key]
         return plain(value) if isinstance(value, (str, bytes)) else ""
 
     def _name(self, path: tuple[str, ...]) -> str:

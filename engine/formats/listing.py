@@ -22,7 +22,9 @@ WIDEST = 64
 LONGEST_TEXT = 200
 """Longest name, unit or comment that is kept, characters."""
 
-_TIME = re.compile(r"(time|t|zeit|temps|timestamps?|time_?s(ec)?|abtastzeit)", re.IGNORECASE)
+_TIME = re.compile(
+    r"(time|t|zeit|uhrzeit|temps|timestamps?|time_?s(ec)?|abtastzeit)", re.IGNORECASE
+)
 _SHOWN = 5
 
 
@@ -117,15 +119,24 @@ def nearest_clocks(found: Sequence[tuple[tuple[str, ...], int]]) -> list[int | N
     return clocks
 
 
-def numbers(values: Any) -> Array:
-    """An array of any kind of number as float64 (n,); seconds from its first for dates."""
+def numbers(values: Any, since: Any = None) -> Array:
+    """An array of any kind of number as float64 (n,); of dates, seconds.
+
+    since : the date that dates count from, a datetime64; their first where it is None
+    """
     values = np.asarray(values).reshape(-1)
     if values.dtype.kind == "M":
-        values = values - values[:1]
+        values = values - (earliest(values[:1]) if since is None else since)
     if values.dtype.kind == "m":
         seconds = values.astype("timedelta64[ns]").astype(np.float64) * 1e-9
         return np.where(np.isnat(values), np.nan, seconds)
     return np.ascontiguousarray(values, dtype=np.float64)
+
+
+def earliest(dates: Iterable[Any]) -> Any:
+    """The earliest of some datetime64, NaT where there is none."""
+    known = [one for one in dates if not np.isnat(one)]
+    return min(known) if known else np.datetime64("NaT")
 
 
 def first_text(*texts: Any) -> str:

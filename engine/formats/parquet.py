@@ -1,7 +1,7 @@
 """Parquet, by pyarrow: pandas, polars, Spark and MATLAB's parquetwrite.
 
 The unit is the field's metadata unit or units, or stands in brackets in its title. Dates count in
-s from the first.
+s from the earliest first one of the file.
 """
 
 from pathlib import Path
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..csv_table import split_title
-from .listing import Listing, first_text, numbers, plain
+from .listing import Listing, earliest, first_text, numbers, plain
 from .table import Array, Column, Table
 
 
@@ -32,6 +32,7 @@ class ParquetTable(Table):
         samples, listing = int(self._file.metadata.num_rows), Listing(source, kind)
         fields = {field.name: field for field in self._file.schema_arrow}
         found: list[tuple[tuple[str, ...], Column, int]] = []
+        begins = []
         for leaf in range(self._file.metadata.num_columns):
             described = self._file.schema.column(leaf)
             field = fields.get(described.path)
@@ -41,20 +42,22 @@ class ParquetTable(Table):
             name, unit = split_title(plain(field.name))
             stated = field.metadata or {}
             unit = first_text(stated.get(b"unit"), stated.get(b"units"), unit)
+            if samples and pa.types.is_timestamp(field.type):
+                first = next(self._file.iter_batches(batch_size=1, columns=[described.path]))
+                begins.append(first.column(0).to_numpy(zero_copy_only=False)[0])
             unit = "s" if pa.types.is_temporal(field.type) else unit
             found.append(((name,), Column(name, unit, samples), leaf))
         listing.add_timed(found)
         self.columns, self.warnings = listing.columns(), listing.warnings()
-        self._leaves = listing.places
+        self._leaves, self._since = listing.places, earliest(begins)
 
     def values(self, index: int) -> Array:
         """The numbers of one column; NaN for what is null."""
         column = self._file.reader.read_column(self._leaves[index])
         if self._pa.types.is_decimal(column.type):
             column = column.cast(self._pa.float64())
-        return numbers(
-            np.concatenate([chunk.to_numpy(zero_copy_only=False) for chunk in column.chunks])
-        )
+        chunks = [chunk.to_numpy(zero_copy_only=False) for chunk in column.chunks]
+        return numbers(np.concatenate(chunks), self._since)
 
 
 def _is_number(pa: Any, kind: Any) -> bool:

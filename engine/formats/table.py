@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import MeasurementError
+from ..errors import MeasurementError, UnmappedError
 
 Array = NDArray[np.float64]
 
@@ -94,10 +94,10 @@ class Table(ABC):
         return numbers
 
     def _not_finite(self, index: int, values: Array, row: int) -> MeasurementError:
-        what = "is not a finite number; repair it or cut the recording there"
+        what, error = "is not a finite number; repair it or cut the recording there", UnmappedError
         if np.isfinite(values[row]):
-            what = "is too large; correct it or the column's unit"
-        return MeasurementError(
+            what, error = "is too large; correct it or the column's unit", MeasurementError
+        return error(
             f"{self.source}: {self.place(row)}, column {self.columns[index].name}: {values[row]:g}"
             f" {what}."
         )

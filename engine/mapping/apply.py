@@ -5,6 +5,7 @@ what the file says is its time. What several clocks recorded is joined (see `clo
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +40,7 @@ def apply(
     Raises MeasurementError naming the file, the column and the remedy.
     """
     source, found = table.source, _found(mapping, table)
-    times = _Times(table, found.pop("time", None))
+    times = _Times(table, found.pop("time", None), mapping.step)
     if not found:
         raise MeasurementError(f"{source}: the mapping names no channel besides time; map some.")
     warnings = list(table.warnings)
@@ -48,7 +49,12 @@ def apply(
         for entry, index in found.values()
     ]
     warnings += times.warnings
-    time, numbers, said = joined(series, source, mapping.step)
+    if times.assumed:
+        warnings.append(
+            f"The file tells no time; its samples were taken every {mapping.step:g} s, as the"
+            " mapping says."
+        )
+    time, numbers, said = joined(series, source, None if times.assumed else mapping.step)
     warnings += said
     require_samples(time.size, source)
     warnings += doubtful_time(time)
@@ -65,6 +71,7 @@ def apply(
 def _found(mapping: ChannelMapping, table: Table) -> dict[str, tuple[MappedColumn, int]]:
     """By channel its entry, and which column of the table that is."""
     found, places = {}, Places(table.columns)
+    taken: dict[int, MappedColumn] = {}
     for entry in mapping.columns:
         where = places.of(entry.column, entry.group)
         if len(where) != 1:
@@ -75,15 +82,26 @@ def _found(mapping: ChannelMapping, table: Table) -> dict[str, tuple[MappedColum
                 f"{table.source}: the file {what} called {entry.column!r}{group}, which the"
                 f" mapping takes for {entry.channel}; {remedy}."
             )
+        other = taken.setdefault(where[0], entry)
+        if other is not entry:
+            raise MeasurementError(
+                f"{table.source}: the file has one column called {entry.column!r}, which the"
+                f" mapping takes for {other.channel} (group {other.group!r}) and for"
+                f" {entry.channel} (group {entry.group!r}); keep one of them."
+            )
         found[entry.channel] = entry, where[0]
     return found
 
 
 class _Times:
-    """The times of the columns, s: of the column mapped as time, or their own."""
+    """The times of the columns, s: of the column mapped as time, or their own.
 
-    def __init__(self, table: Table, mapped: tuple[MappedColumn, int] | None):
-        self._table = table
+    step : time between the samples where nothing in the file tells any time, s
+    assumed : whether it was needed
+    """
+
+    def __init__(self, table: Table, mapped: tuple[MappedColumn, int] | None, step: float | None):
+        self._table, self._step, self.assumed = table, step, False
         self._entry, self._index = mapped or (None, -1)
         self._clocks = Clocks(table.source)
         self.warnings = self._clocks.warnings
@@ -99,7 +117,17 @@ class _Times:
             return self._clocks.kept("mapped", self._mapped, entry.column)
         if key:
             return self._clocks.kept(key, lambda: self._own(one), entry.column)
-        remedy = "map the column that holds it as time"
+        step, untimed = self._step, not any(map(clock_key, columns))
+        if step is not None and untimed and mapped is None:
+            self.assumed = True
+            even = replace(one, start=0.0, step=step)
+            return self._clocks.kept(
+                ("assumed", one.samples), lambda: even_time(even), entry.column
+            )
+        remedy = (
+            'map the column that holds it as time, or write as "step" of the mapping how many'
+            " seconds lie between samples if no column does"
+        )
         if mapped is not None:
             remedy = (
                 f"{mapped.name}, which is mapped as time, has {mapped.samples} samples and this"

@@ -14,7 +14,7 @@ from ..channels import ChannelInfo, channel, find_channel
 from ..csv_table import split_title
 from ..formats.table import Column
 from ..units import plain_unit
-from .mapping import ChannelMapping, MappedColumn, Places
+from .mapping import ChannelMapping, MappedColumn, Places, told_apart
 from .names import readings
 from .numbers import Statistics
 from .patterns import MEASURES, fits
@@ -22,6 +22,7 @@ from .signs_stated import stated_sign
 from .sizes import (
     UPRIGHT,
     TakenUnit,
+    differ,
     measured_by,
     reads_gravity,
     size_of,
@@ -36,6 +37,9 @@ CANDIDATE, MOST_CANDIDATES = 0.15, 4
 
 NEVER_CHANGES = 0.7
 """What is left of the confidence in a column that never changes."""
+
+OTHER_UNIT = 0.75
+"""Confidence in a template's unit where the file states another one."""
 
 FITS_AS_WELL = 0.05
 """Difference in confidence by which a second column fits a channel as well."""
@@ -90,9 +94,9 @@ def guess(
     candidates = [
         _candidates(one, known.get(index), index in clocks) for index, one in enumerate(columns)
     ]
-    twice = _named_twice(columns)
-    for index in (*twice, *(clocks if clocks_told else ())):
+    for index in clocks if clocks_told else ():
         candidates[index] = []
+    columns = told_apart(columns)
     chosen = _body_fixed(_assigned(candidates), candidates)
     for index, one in chosen.items():
         rivals = [
@@ -114,18 +118,45 @@ def guess(
         mapping,
         chosen,
         tuple(tuple(offered[:MOST_CANDIDATES]) for offered in candidates),
-        tuple(_warnings(columns, known, chosen, twice)),
+        tuple(_warnings(columns, known, chosen)),
     )
 
 
-def with_template(found: Guess, columns: Sequence[Column], template: ChannelMapping) -> Guess:
-    """A guess with the mapping of a template that fits the columns in place of the guessed one."""
-    chosen, places = {}, Places(columns)
+def with_template(
+    found: Guess,
+    columns: Sequence[Column],
+    known: Mapping[int, Statistics],
+    template: ChannelMapping,
+) -> Guess:
+    """A guess with the mapping of a template that fits the columns in place of the guessed one.
+
+    Doubted are the units where the file states another one: the template may come from a file in
+    other units, or from a person who knows that the header lies.
+    """
+    chosen, said, places = {}, [], Places(columns)
     for one in template.columns:
         [index] = places.of(one.column, one.group)
         reason = "template" + (f"; {one.note}" if one.note else "")
-        chosen[index] = Candidate(one.channel, one.unit, one.sign, 1.0, reason)
-    return replace(found, mapping=template, chosen=chosen)
+        sure = Candidate(one.channel, one.unit, one.sign, 1.0, reason)
+        chosen[index] = sure
+        stated = _stated_unit(columns[index])[1]
+        if stated and differ(stated, one.unit, channel(one.channel).unit):
+            why = f"{reason}; the file states {stated}"
+            chosen[index] = replace(sure, confidence=OTHER_UNIT, reason=why, doubted=True)
+            said.append(
+                f"{one.column} is in {stated} by the file, but the template takes {one.channel}"
+                f" in {one.unit}; see which of them holds."
+            )
+    said += _warnings(columns, known, chosen)
+    return replace(found, mapping=template, chosen=chosen, warnings=tuple(said))
+
+
+def _stated_unit(column: Column) -> tuple[str, str]:
+    """A column's name without its unit, and that unit, plain."""
+    name, unit = column.name, column.unit
+    if not unit:
+        name, unit = split_title(name)
+    return name, plain_unit(unit)
 
 
 def _entry(column: Column, one: Candidate) -> MappedColumn:
@@ -134,10 +165,7 @@ def _entry(column: Column, one: Candidate) -> MappedColumn:
 
 def _candidates(column: Column, known: Statistics | None, clock: bool) -> list[Candidate]:
     """What a column may be, the likeliest first."""
-    name, unit = column.name, column.unit
-    if not unit:
-        name, unit = split_title(name)
-    stated = plain_unit(unit)
+    name, stated = _stated_unit(column)
     own = find_channel(name.strip().lower())
     found: dict[str, tuple[float, tuple[str, ...]]] = {}
     if own is not None:
@@ -235,36 +263,22 @@ def _body_fixed(
     return chosen
 
 
-def _named_twice(columns: Sequence[Column]) -> list[int]:
-    """Columns that cannot be told from an earlier one by group and name."""
-    seen: set[tuple[str, str]] = set()
-    twice = []
-    for index, one in enumerate(columns):
-        if (one.group, one.name) in seen:
-            twice.append(index)
-        seen.add((one.group, one.name))
-    return twice
-
-
 def _warnings(
     columns: Sequence[Column],
     known: Mapping[int, Statistics],
     chosen: Mapping[int, Candidate],
-    twice: Sequence[int],
 ) -> list[str]:
     """Sentences about units that lie, stand-ins, gaps, clipping and constant columns."""
     said = []
     if all(one.channel == "time" for one in chosen.values()):
         said.append("No column is taken for a channel by its name; map some by hand.")
-    for index in twice:
-        said.append(
-            f"Column {index + 1} is called {columns[index].name} like an earlier one; it can be"
-            " mapped once one of them is renamed."
-        )
     for index, one in chosen.items():
         name, numbers = columns[index].name, known.get(index)
         if "lies:" in one.reason or ", but " in one.reason:
             said.append(f"{name} is taken as {one.channel} in {one.unit}: {one.reason}.")
+        if one.sign < 0 and "turned over, " in one.reason:
+            why = one.reason.partition("; turned over, ")[2]
+            said.append(f"{name} is taken as {one.channel} turned over, {why}; look at its sign.")
         if numbers is None:
             continue
         for value, samples in numbers.stand_ins:

@@ -9,7 +9,7 @@ It is kept as JSON and used again for every file whose columns have the same nam
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -107,19 +107,38 @@ class ChannelMapping:
         return frozenset(one.channel for one in self.columns if one.sign_sure)
 
     def fits(self, columns: "Places") -> bool:
-        """Whether a file has every column."""
-        return bool(self.columns) and all(
-            len(columns.of(one.column, one.group)) == 1 for one in self.columns
-        )
+        """Whether a file has every column, each another one."""
+        found = [columns.of(one.column, one.group) for one in self.columns]
+        alone = {where[0] for where in found if len(where) == 1}
+        return bool(found) and len(alone) == len(found)
+
+
+def told_apart(columns: Sequence[Column]) -> tuple[Column, ...]:
+    """Columns of which those of one name and group are numbered: z, z (2), z (3)."""
+    taken = {(one.group, one.name) for one in columns}
+    seen: dict[tuple[str, str], int] = {}
+    named = []
+    for one in columns:
+        key = one.group, one.name
+        seen[key] = number = seen.get(key, 0) + 1
+        name = one.name
+        while number > 1 and (one.group, name) in taken:
+            name, number = f"{one.name} ({number})", number + 1
+        if name != one.name:
+            seen[key] = number - 1
+            taken.add((one.group, name))
+            one = replace(one, name=name)
+        named.append(one)
+    return tuple(named)
 
 
 class Places:
-    """Where the columns of a file are, by name and group."""
+    """Where the columns of a file are, by name, numbered where it is there again, and group."""
 
     def __init__(self, columns: Sequence[Column]):
         self._named: dict[str, list[int]] = {}
         self._groups = [one.group for one in columns]
-        for index, one in enumerate(columns):
+        for index, one in enumerate(told_apart(columns)):
             self._named.setdefault(one.name, []).append(index)
 
     def of(self, name: str, group: str) -> list[int]:

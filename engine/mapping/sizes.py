@@ -111,6 +111,14 @@ def measured_by(unit: str) -> str:
     return ""
 
 
+def differ(one: str, other: str, si: str) -> bool:
+    """Whether a known unit is not the same as another one, which measures what `si` does."""
+    factor, wanted = _factor(one, si), _factor(other, si)
+    if factor is None or wanted is None:
+        return bool(measured_by(one))
+    return not math.isclose(factor, wanted, rel_tol=1e-9)
+
+
 def taken_unit(
     info: ChannelInfo, stated: str, ending: tuple[str, ...], known: Statistics | None
 ) -> TakenUnit:

@@ -7,7 +7,7 @@ from ..errors import MeasurementError
 from ..formats.kinds import CSV
 from ..formats.table import Column, Table
 from .guess import Guess, guess, named_like_channels, with_template
-from .mapping import ChannelMapping, Places
+from .mapping import ChannelMapping, Places, told_apart
 from .numbers import Statistics, statistics
 
 MOST_SURVEYED = 25_000_000
@@ -19,6 +19,7 @@ class Survey:
     """Columns of a file, what their numbers say, and what is proposed for them.
 
     known : by column, of those whose numbers were read
+    doubts : sentences about what is doubtful in the file whatever its columns are taken for
     template : the name of the template whose mapping is proposed in place of a guess, "" for none
     """
 
@@ -27,15 +28,20 @@ class Survey:
     columns: tuple[Column, ...]
     known: Mapping[int, Statistics]
     guess: Guess
-    warnings: tuple[str, ...]
+    doubts: tuple[str, ...]
     template: str = ""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences about what needs a look, in the file and in what is proposed."""
+        return (*self.doubts, *self.guess.warnings)
 
     def with_templates(self, templates: Mapping[str, ChannelMapping]) -> "Survey":
         """With the first of some templates that fits the columns in place of the guess."""
         places = Places(self.columns)
         for name, one in templates.items():
             if one.fits(places):
-                found = with_template(self.guess, self.columns, one)
+                found = with_template(self.guess, self.columns, self.known, one)
                 return replace(self, guess=found, template=name)
         return self
 
@@ -61,5 +67,5 @@ def survey(table: Table) -> Survey:
             " columns' names on one line and a row of numbers a sample."
         )
     found = guess(columns, known, clocks_told=table.kind != CSV)
-    warnings = (*table.warnings, *bad, *found.warnings)
-    return Survey(table.source, table.kind, columns, known, found, warnings)
+    doubts = tuple(dict.fromkeys((*table.warnings, *bad)))
+    return Survey(table.source, table.kind, told_apart(columns), known, found, doubts)

@@ -127,7 +127,7 @@ WORDS: Mapping[str, Said] = {
         torque=({"quantity": "torque"}, "torque trq moment mom drehmoment"),
         time=(
             {"quantity": "time"},
-            "time zeit timestamp timestamps zeitstempel zeitkanal times elapsed",
+            "time zeit uhrzeit timestamp timestamps zeitstempel zeitkanal times elapsed",
         ),
         heave=({"axis": "z"}, "heave bounce vertical vert vertikal hoch huben hubbewegung"),
         longitudinal=(

@@ -30,6 +30,24 @@ def foreign(step: int = STEP, turned: tuple[str, ...] = ()) -> bytes:
     return "\n".join(lines).encode()
 
 
+def test_a_file_of_ours_with_gaps_or_a_slip_is_kept_until_it_is_mapped(visitor):
+    """What is proposed for it can be applied."""
+    lines = ["time [s],chassis.z [mm],chasis.pitch [deg]", "0,1,2", "0.01,,2"]
+    lines += [f"{k / 100},{k % 7},{k % 5}" for k in range(2, 50)]
+    found = visitor.upload("\n".join(lines).encode(), "lap.csv").json()
+    assert found["needs_mapping"] is True
+    assert "did you mean chassis.pitch?" in found["warnings"][0]
+    lines[0] = "time [s],chassis.z [mm],chassis.pitch [deg]"
+    found = visitor.upload("\n".join(lines).encode(), "lap.csv").json()
+    assert found["needs_mapping"] is True
+    assert "line 3, column chassis.z [mm]: the cell is empty" in found["warnings"][0]
+    place = f"/measurements/{found['id']}"
+    proposed = visitor.get(f"{place}/columns").json()["proposed"]
+    mapped = visitor.put(f"{place}/mapping", json=proposed).json()
+    assert mapped["needs_mapping"] is False
+    assert [one["name"] for one in mapped["channels"]] == ["chassis.z", "chassis.pitch"]
+
+
 @pytest.fixture
 def kept(visitor):
     """An upload that needs a mapping; its pitch is turned over."""

@@ -86,6 +86,19 @@ def test_a_degree_sign_written_by_windows_is_understood():
     assert table_of("time [s],pitch [°]\n0,1\n".encode("cp1252")).header[1] == "pitch [°]"
 
 
+def test_decimal_commas_between_quotes_are_told_from_thousands():
+    """1,250 may be either; beside 0,5 it is a decimal, beside 1.5 or alone it is refused."""
+    text = 't,z\n"0,000","1,250"\n"0,5","-1,5"\n'
+    np.testing.assert_array_equal(read(text), [[0.0, 1.25], [0.5, -1.5]])
+    for text in ('t,z\n1,"1,250"\n2,"3,500"\n', 't,z\n1.5,"1,250"\n2.5,"1,5"\n'):
+        assert "line 2, column z: '1,250' is not a number" in refusal(text)
+    assert "'1,234,567' is not a number" in refusal('t,z\n1,"1,234,567"\n2,"1,5"\n')
+
+
+def test_a_typographic_minus_is_a_minus():
+    np.testing.assert_array_equal(read("t;z\n0;\u22121,5\n1;2e\u22123\n"), [[0, -1.5], [1, 2e-3]])
+
+
 def test_text_in_a_column_that_is_not_used_does_no_harm():
     content = PLAIN.replace("-12.0", '"wet, ""cold"""')
     np.testing.assert_array_equal(table_of(content).numbers([0, 1]), NUMBERS[:, :2])
@@ -279,6 +292,17 @@ def test_a_spoilt_first_row_is_no_header():
         assert f"line 2, column {column}" in said
 
 
+def test_a_first_row_of_dashes_is_a_sample():
+    """A logger's dash for nothing measured; a row of units has one unit at least."""
+    table = table_of("t,a,b\n1,-,-\n2,3,4\n")
+    assert table.header == ["t", "a", "b"]
+    numbers, bad = table.with_gaps([0, 1, 2])
+    np.testing.assert_array_equal(numbers, [[1.0, np.nan, np.nan], [2.0, 3.0, 4.0]])
+    assert not bad
+    assert table_of("t,a,b\n-,-,-\n2,3,4\n").count() == 1
+    assert table_of("t,a,b\ns,-,1\n2,3,4\n").header == ["t [s]", "a", "b [1]"]
+
+
 def test_empty_cells_are_gaps_and_other_text_spoils_its_column_alone():
     """Three columns in one pass: whole, with gaps, with a word."""
     text = "a,b,c\n1,2,3\n2,,x\n3,NaN,1_0\n4,5,6\n"
@@ -287,6 +311,38 @@ def test_empty_cells_are_gaps_and_other_text_spoils_its_column_alone():
     np.testing.assert_array_equal(numbers[:, 1], [2.0, np.nan, np.nan, 5.0])
     assert list(bad) == [2]
     assert "line 3, column c: 'x' is not a number" in str(bad[2])
+
+
+def test_dates_and_remarks_spoil_their_own_column_alone():
+    """Of a German file: numbers with commas, a date, a quoted remark, a number with both signs."""
+    text = 't;Datum;z;Text;F\n0,5;12.03.2024;1,5;"los; ab";1,5\n1,0;12.03.2024;2,5;a, b;1.234,5\n'
+    numbers, bad = table_of(text).with_gaps(range(5))
+    np.testing.assert_array_equal(numbers[:, [0, 2]], [[0.5, 1.5], [1.0, 2.5]])
+    assert {column: str(error)[9:].split(" is not")[0] for column, error in bad.items()} == {
+        1: "line 2, column Datum: '12.03.2024'",
+        3: "line 2, column Text: 'los; ab'",
+        4: "line 3, column F: '1.234,5'",
+    }
+    np.testing.assert_array_equal(table_of("t;a\n0.5;los, ab\n").numbers([0]), [[0.5]])
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ("23:59:59,75", "0:00:00,25"),
+        ("12:00:00", "12:00:00.5"),
+        ("2024-02-29T23:59:59.750Z", "2024-03-01T00:00:00.250Z"),
+        ("31.12.2023 23:59:59,75", "01.01.2024 00:00:00,25"),
+    ],
+)
+def test_times_of_day_count_from_the_first(first, second):
+    """Half a second later, over midnight, too; beside decimal commas and points."""
+    for number in ("1,5", "1.5"):
+        table = table_of(f"Messung 7\nUhrzeit;z\n{first};{number}\n{second};{number}\n")
+        assert (table.header, table.clocks) == (["Uhrzeit", "z"], {0})
+        np.testing.assert_array_equal(table.numbers([0, 1]), [[0.0, 1.5], [0.5, 1.5]])
+    with pytest.raises(MeasurementError, match="line 3, column Uhrzeit: '24. May' is not a number"):
+        table_of(f"Uhrzeit;z\n{first};1\n24. May;2\n").numbers([0])
 
 
 def test_a_number_with_underscores_is_no_number():

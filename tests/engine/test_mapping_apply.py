@@ -1,10 +1,12 @@
 """A table and a mapping become a run. Oracle: straight lines, which interpolation follows."""
 
+import io
 import json
 
 import numpy as np
 import pytest
 from ridetune.engine.errors import MeasurementError
+from ridetune.engine.formats.csv_file import CsvFile
 from ridetune.engine.formats.table import Column, HeldTable
 from ridetune.engine.mapping.apply import apply
 from ridetune.engine.mapping.mapping import (
@@ -15,6 +17,7 @@ from ridetune.engine.mapping.mapping import (
     mapping_to_json,
     read_mapping,
 )
+from ridetune.engine.mapping.survey import survey
 
 from .mapped_tables import guessed, held, renamed, truth
 
@@ -110,6 +113,37 @@ def test_columns_of_one_name_are_told_apart_by_their_group():
     assert "in the group 'C'" in refusal(mapped("C"), table)
     alone = HeldTable("lap", "test", described[:1], [wave()])
     np.testing.assert_allclose(apply(mapped("C"), alone)["chassis.z"], 1e-3 * wave())
+
+
+def test_a_german_log_with_times_of_day_is_mapped_as_it_is():
+    rows = "".join(f"12:00:{k / 100:05.2f};{k},5;los\n".replace(".", ",") for k in range(300))
+    table = CsvFile(io.BytesIO(f"Uhrzeit;Aufbau z [mm];Text\n{rows}".encode()), "lap.csv")
+    found = survey(table)
+    [said] = found.doubts
+    assert said.startswith("line 2, column Text: 'los' is not a number")
+    run = apply(found.guess.mapping, table)
+    np.testing.assert_allclose(run.time, 0.01 * np.arange(300), atol=1e-9)
+    np.testing.assert_allclose(run["chassis.z"], 1e-3 * (np.arange(300) + 0.5))
+
+
+def test_a_file_without_a_time_takes_the_step_of_its_mapping():
+    table = held({"height": ("mm", wave())})
+    assert 'write as "step" of the mapping' in refusal(ChannelMapping((HEIGHT,)), table)
+    run = apply(ChannelMapping((HEIGHT,), step=0.01), table)
+    np.testing.assert_allclose(run.time, TIME)
+    np.testing.assert_allclose(run["chassis.z"], 1e-3 * wave())
+    assert run.warnings == (
+        "The file tells no time; its samples were taken every 0.01 s, as the mapping says.",
+    )
+
+
+def test_one_column_is_never_two_channels():
+    """Two groups of the file that was mapped, one column without a group in this one."""
+    body = MappedColumn("acc_z", "chassis.a_z", "g", "IMU")
+    mapping = ChannelMapping((body, MappedColumn("acc_z", "seat.driver.a_z", "g", "Seat")))
+    table = table_of(("acc_z", 0.0, 0.01, wave()))
+    assert not mapping.fits(Places(table.columns))
+    assert "takes for chassis.a_z (group 'IMU') and for seat.driver.a_z" in refusal(mapping, table)
 
 
 def test_time_alone_is_no_recording():

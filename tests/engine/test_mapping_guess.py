@@ -1,11 +1,15 @@
 """Which column is which channel. Oracle throughout: a table made of channels that are known."""
 
+import io
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from ridetune.engine.channels import CHANNELS, channel
-from ridetune.engine.formats.table import Column
+from ridetune.engine.formats.csv_file import CsvFile
+from ridetune.engine.formats.table import Column, HeldTable
 from ridetune.engine.mapping.apply import apply
 from ridetune.engine.mapping.guess import THRESHOLD, guess
 from ridetune.engine.mapping.mapping import ChannelMapping, MappedColumn
@@ -322,11 +326,25 @@ def test_angle_by_unit_is_a_rate_by_unit():
         ("Verzoegerung", "", -1),
         ("damper travel fl", "rebound positive", -1),
         ("acc_x", "", 1),
+        ("acc_x", "rearward positive", -1),
+        ("LaengsVerzoegerung", "", -1),
+        ("pitch_NoseUp", "", -1),
+        ("acc_x", "acceleration (positive) / deceleration (negative)", 1),
+        ("acc_x", "by backward difference", 1),
+        ("heave", "not z-down", 1),
+        ("heave", "z down is negative", 1),
+        ("roll", "signal of right update rate", 1),
+        ("roll", "left side up, right side down", 1),
+        ("pitch", "negative for nose up", 1),
+        ("pitch", "not calibrated, nose up", -1),
     ],
 )
 def test_a_stated_sign_is_followed(name, comment, sign):
-    unit = {"pitch": "deg", "roll": "deg", "acc_x": "g", "Verzoegerung": "g"}.get(name, "mm")
-    assert guessed_name(name, unit, comment).chosen[0].sign == sign
+    units = {"pitch": "deg", "roll": "deg", "pitch_NoseUp": "deg", "heave": "mm"}
+    unit = units.get(name, "mm" if "travel" in name else "g")
+    found = guessed_name(name, unit, comment)
+    assert found.chosen[0].sign == sign
+    assert [f"{name} is taken as" in one for one in found.warnings] == [True] * (sign < 0)
 
 
 # --- rivals and numbers -----------------------------------------------------------------------
@@ -378,12 +396,24 @@ def test_raw_sensors_are_told_from_inertial_channels_by_gravity():
     assert inertial.chosen[1].sign == 1
 
 
-def test_columns_of_one_name_are_not_told_apart():
+def test_columns_of_one_name_are_told_apart_by_number():
+    """What is proposed of such a file can be applied, and each of the columns be mapped."""
     time = np.arange(0.0, 5.0, 0.01)
-    table = held({"Time": ("s", time), "heave": ("mm", np.sin(time))})
-    doubled = guess([*table.columns, table.columns[1]], {})
-    assert sorted(doubled.chosen) == [0, 1]
-    assert any("Column 3 is called heave like an earlier one" in one for one in doubled.warnings)
+    one, other = 3.0 * np.sin(time), 5.0 * np.cos(time)
+    described = [Column(name, "mm", time.size, step=0.01) for name in ("z", "z (2)", "z", "z")]
+    table = HeldTable("lap", "test", tuple(described), [one, one, other, time])
+    found = survey(table)
+    assert [column.name for column in found.columns] == ["z", "z (2)", "z (3)", "z (4)"]
+    apply(guessed(table).mapping, table)
+    run = apply(ChannelMapping((MappedColumn("z (3)", "chassis.z", "mm"),)), table)
+    np.testing.assert_allclose(run["chassis.z"], 1e-3 * other)
+    text = b"time [s],heave [mm],heave [mm]\n" + b"".join(
+        b"%g,%g,%g\n" % row for row in zip(time, one, other, strict=True)
+    )
+    table = CsvFile(io.BytesIO(text), "lap.csv")
+    mapping = guessed(table).mapping
+    assert [entry.column for entry in mapping.columns] == ["time", "heave"]
+    np.testing.assert_allclose(apply(mapping, table)["chassis.z"], 1e-3 * one, rtol=1e-5)
 
 
 def test_stand_ins_gaps_and_constant_columns_are_named():
@@ -429,10 +459,34 @@ def test_of_a_file_too_large_only_what_may_be_a_channel_is_read(monkeypatch):
 
 def test_a_template_that_fits_is_proposed_in_place_of_the_guess():
     table = renamed(truth(), SCHEMES["German"])
-    other = ChannelMapping((MappedColumn("Nickwinkel", "chassis.roll", "mrad", sign=-1),))
+    other = ChannelMapping((MappedColumn("Nickwinkel", "chassis.roll", "deg", sign=-1),))
     missing = ChannelMapping((MappedColumn("not there", "chassis.roll", "mrad"),))
     found = survey(table).with_templates({"a": missing, "b": other})
     assert (found.template, found.guess.mapping) == ("b", other)
     [one] = found.guess.chosen.values()
-    assert (one.channel, one.unit, one.sign, one.reason) == ("chassis.roll", "mrad", -1, "template")
+    assert (one.channel, one.unit, one.sign, one.reason) == ("chassis.roll", "deg", -1, "template")
     assert survey(table).with_templates({"a": missing}).template == ""
+
+
+def test_a_template_in_another_unit_than_the_file_states_is_doubted():
+    """The template comes from a file in mm; spellings of a unit are no other unit."""
+    time = np.arange(0.0, 5.0, 0.01)
+    entries = (
+        MappedColumn("z", "chassis.z", "mm"),
+        MappedColumn("ax", "chassis.a_x", "m/s^2"),
+        MappedColumn("roll", "chassis.roll", "deg"),
+    )
+    table = held(
+        {
+            "z": ("cm", 2.0 * np.sin(time)),
+            "ax": ("m|s2", np.sin(time)),
+            "roll": ("", np.sin(time)),
+        }
+    )
+    found = survey(table).with_templates({"mm": ChannelMapping(entries)})
+    doubted = [(one.doubted, one.confidence < 1.0) for one in found.guess.chosen.values()]
+    assert doubted == [(True, True), (False, False), (False, False)]
+    [said] = found.warnings
+    assert said.startswith("z is in cm by the file, but the template takes chassis.z in mm")
+    same = replace(entries[0], unit="cm")
+    assert not survey(table).with_templates({"cm": ChannelMapping((same,))}).warnings

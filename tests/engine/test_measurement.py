@@ -5,8 +5,11 @@ import numpy as np
 import pytest
 import ridetune.sample_runs
 from ridetune.engine.channels import CHANNELS, Run
-from ridetune.engine.errors import MeasurementError
+from ridetune.engine.errors import MeasurementError, UnmappedError
 from ridetune.engine.formats import csv_file
+from ridetune.engine.formats.opening import opened_bytes
+from ridetune.engine.mapping.apply import apply
+from ridetune.engine.mapping.mapping import ChannelMapping, MappedColumn
 from ridetune.engine.measurement import (
     missing_for_identification,
     parse_run,
@@ -175,7 +178,9 @@ def test_a_column_that_is_no_channel_is_left_out_with_a_warning():
     ],
 )
 def test_a_misspelt_channel_is_refused_rather_than_lost(title, known):
-    message = refusal(small("chassis.z [m]", title))
+    with pytest.raises(UnmappedError) as caught:
+        parse(small("chassis.z [m]", title))
+    message = str(caught.value)
     assert f"column 3 is called {title}; did you mean {known}?" in message
 
 
@@ -246,6 +251,24 @@ def test_nan_is_refused_with_its_line_and_column():
     columns["chassis.z [m]"] = np.where(np.arange(SAMPLES) == 5, np.nan, WAVE)
     message = refusal(columns)
     assert message.startswith("run.csv: line 7, column chassis.z [m]: 'nan' is not finite;")
+
+
+@pytest.mark.parametrize("cell", ["", "nan", "-"])
+def test_a_file_with_a_gap_is_told_to_be_one_for_a_mapping(cell):
+    """By a child, too, whose errors come as sentences; other text is no gap."""
+    text = "time [s],chassis.z [mm]\n" + "".join(f"{k / 100},{k}\n" for k in range(20))
+    with pytest.raises(UnmappedError, match="line 22, column chassis.z"):
+        parse_run(f"{text}0.2,{cell}\n0.21,5\n".encode(), "run.csv", apart=cell == "nan")
+    for other in ("inf", "x"):
+        with pytest.raises(MeasurementError) as caught:
+            parse_run(f"{text}0.2,{other}\n".encode(), "run.csv")
+        assert not isinstance(caught.value, UnmappedError)
+    mapping = ChannelMapping(
+        (MappedColumn("time", "time", "s"), MappedColumn("chassis.z", "chassis.z", "mm"))
+    )
+    with opened_bytes(f"{text}0.2,{cell}\n0.21,21\n".encode(), "run.csv") as table:
+        run = apply(mapping, table)
+    np.testing.assert_allclose(run["chassis.z"], 0.1 * run.time, atol=1e-15)
 
 
 @pytest.mark.parametrize("wrong", [0.04, 0.03, -1.0])
@@ -337,6 +360,9 @@ def test_a_plausible_magnitude_is_not_questioned(title, peak):
 def test_a_doubtful_time_is_questioned():
     run = parse({"time [s]": 1000 * TIME, "chassis.z [m]": 0.01 * WAVE})
     assert run.warnings == ("time advances by 10 s a sample; is it in ms?",)
+    # 10,000 samples a second without a unit.
+    run = parse({"time": 10 * TIME, "chassis.z [m]": 0.01 * WAVE})
+    assert run.warnings[-1] == "time advances by 0.1 s a sample; is it in ms?"
 
 
 # --- identification ---------------------------------------------------------------------------

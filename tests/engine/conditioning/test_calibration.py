@@ -45,6 +45,30 @@ def test_a_car_stands_where_its_speed_is_zero_too():
     assert (begin, end) == (0.0, 4.99)
 
 
+def braking(**channels):
+    """From 20 m/s at 1.2 m/s2, after 5 s of steady driving, on a smooth road: no channel moves."""
+    slowing = np.where(TIME < 5.0, 0.0, -1.2)
+    raw = {"chassis.body_a_x": slowing + 0.005, "chassis.pitch_rate": 0.001 + 0.0 * TIME}
+    return Run("r", TIME, {**raw, **channels})
+
+
+def test_a_car_whose_wheels_turn_does_not_stand():
+    speed = 20.0 - np.where(TIME < 5.0, 0.0, 1.2 * (TIME - 5.0))
+    assert standstill(braking(**{"wheel.rl.speed": speed})) is None
+    locked = {"wheel.fl.speed": 0.0 * TIME, "wheel.rl.speed": speed}
+    assert standstill(braking(**locked)) is None
+    assert standstill(braking(**{"chassis.v_x": np.where(TIME < 5.0, speed, np.nan)})) is None
+
+
+def test_without_a_speed_standing_is_assumed_and_never_while_it_brakes():
+    found = condition(braking(), [Rest()]).conditioning[0]
+    assert found.numbers["end_s"] == pytest.approx(5.0, abs=0.6)
+    assert found.numbers["end_s"] < 5.0
+    assert "is assumed: no speed is recorded" in found.sentences[-1]
+    easing = braking(**{"chassis.body_a_x": 0.4 - 0.35 * TIME})
+    assert standstill(easing) is None
+
+
 def test_a_car_that_never_stands_has_no_rest():
     assert standstill(Run("r", TIME, {"chassis.pitch": np.sin(10 * TIME)})) is None
     assert standstill(Run("r", TIME, {"chassis.v_x": 5.0 + 0.0 * TIME})) is None

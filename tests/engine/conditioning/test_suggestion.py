@@ -78,6 +78,12 @@ def test_potentiometers_gyros_and_accelerometers_make_all_that_is_needed(raw):
     assert missing_for_identification(condition(raw, found.steps, CAR)) == ()
 
 
+def test_a_standstill_that_no_speed_shows_is_told_as_assumed(raw):
+    told, untold = suggest(raw, CAR), suggest(only(raw, "body_a", "_rate"), CAR)
+    assert "the car stands from" in told.reasons[kinds(told).index("rest")]
+    assert "is assumed" in untold.reasons[kinds(untold).index("rest")]
+
+
 def test_hub_accelerometers_do_without_a_vehicle(raw):
     found = suggest(raw)
     assert kinds(found)[-2:] == ["displacement", "displacement"]

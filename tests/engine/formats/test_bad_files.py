@@ -21,7 +21,11 @@ from ridetune.engine.errors import MeasurementError
 from ridetune.engine.formats import readers
 from ridetune.engine.formats.child import Bounds
 from ridetune.engine.formats.confine import landlock_version
+from ridetune.engine.formats.erg import ErgFile
+from ridetune.engine.formats.hdf5 import Hdf5File
+from ridetune.engine.formats.kinds import ERG_ZIP
 from ridetune.engine.formats.opening import opened
+from ridetune.engine.formats.syscalls import filtered
 from ridetune.engine.measurement import parse_run
 from scipy.io import savemat
 
@@ -238,6 +242,21 @@ def test_hdf5_never_leads_elsewhere(tmp_path, put, said):
     assert said in refusal(path)
 
 
+def test_a_strange_attribute_spoils_nothing(tmp_path):
+    def strange(file):
+        column = file.create_dataset("x", data=np.arange(5.0))
+        column.attrs["MATLAB_class"] = np.arange(3)
+        column.attrs.create("unit", b"V" * 20_000, dtype="S20000")
+        column.attrs["units"] = h5py.Empty("f8")
+        column.attrs["Unit"] = "mm"
+        text = file.create_dataset("t", data=np.arange(5, dtype=np.uint16))
+        text.attrs["MATLAB_class"] = np.bytes_("char")
+
+    table = Hdf5File(only(tmp_path, strange), "r.h5", "HDF5")
+    assert [(column.name, column.unit) for column in table.columns] == [("x", "mm")]
+    assert "t is text" in table.warnings[0]
+
+
 def test_an_hdf5_bomb_is_refused_by_what_it_declares(tmp_path):
     def bomb(file):
         zeros = file.create_dataset("x", (1 << 27,), "f8", chunks=(1 << 20,), compression="gzip")
@@ -251,6 +270,18 @@ def test_a_parquet_bomb_is_refused_by_what_it_declares(tmp_path):
     pq.write_table(runs, tmp_path / "r.parquet", compression="zstd")
     assert (tmp_path / "r.parquet").stat().st_size < 1_000_000
     assert "x declares more than 25000000 samples" in refusal(tmp_path / "r.parquet")
+
+
+def test_a_carmaker_bomb_is_refused_by_what_it_declares(tmp_path, monkeypatch):
+    """Before a byte of the recording is unpacked: here of one packed in an unknown way."""
+    monkeypatch.setattr("ridetune.engine.formats.erg.MOST_SAMPLES", 49)
+    files.erg_zip(tmp_path / "r.zip")
+    data = bytearray((tmp_path / "r.zip").read_bytes())
+    for at in (8, data.index(b"PK\x01\x02") + 10):  # the method of the first member
+        data[at : at + 2] = b"\x63\x00"
+    path = held(tmp_path, "bomb.zip", bytes(data))
+    with pytest.raises(MeasurementError, match="24 bytes make 50 samples, more than 49; cut the"):
+        ErgFile(path, "bomb.zip", ERG_ZIP)
 
 
 def test_a_spectrum_is_named(tmp_path):
@@ -322,12 +353,56 @@ def test_a_child_has_nothing_of_its_parents(tmp_path, monkeypatch):
     assert not os.path.exists(said.split("'")[-2])
 
 
-@pytest.mark.skipif(landlock_version() < 1, reason="this system has no Landlock")
-def test_a_child_leaves_nothing_outside_its_folder(tmp_path, monkeypatch):
-    slow(monkeypatch, STUB.format(f"open({str(tmp_path / 'garbage')!r}, 'w')"))
+TRIES = """
+import os, socket, subprocess, sys
+tries = {
+    "makes": lambda: open(victim + ".new", "w"),
+    "writes": lambda: open(victim, "r+"),
+    "truncates": lambda: os.truncate(victim, 0),
+    "removes": lambda: os.unlink(victim),
+    "renames": lambda: os.rename(victim, victim + ".new"),
+    "reads": lambda: open(victim),
+    "lists": lambda: os.listdir(os.path.dirname(victim)),
+    "passwords": lambda: open("/etc/passwd"),
+    "signals": lambda: os.kill(os.getppid(), 0),
+    "chmods": lambda: os.chmod(victim, 0o777),
+    "touches": lambda: os.utime(victim, (0, 0)),
+    "forks": lambda: os.fork() or os._exit(0),
+    "runs": lambda: subprocess.run([sys.executable, "-c", "0"]),
+    "connects": lambda: socket.socket(),
+    "escapes": os.setsid,
+    "works": lambda: open("own", "w").write("1"),
+}
+done = []
+for name, attempt in tries.items():
+    try:
+        attempt()
+        done.append(name)
+    except OSError:
+        pass
+import ridetune.engine.errors
+raise ridetune.engine.errors.MeasurementError(" ".join(done) + ".")
+"""
+
+
+@pytest.mark.skipif(
+    landlock_version() < 6 or not filtered(), reason="this system confines a child less"
+)
+def test_a_child_can_do_nothing_outside_its_folder(tmp_path, monkeypatch):
+    """Nor read anything else, nor have processes of its own, which its limits would not end."""
+    victim = tmp_path / "elsewhere" / "victim"
+    victim.parent.mkdir()
+    victim.write_text("kept")
+    before = victim.stat()
+    tries = f"victim = {str(victim)!r}\n{TRIES}"
+    slow(monkeypatch, STUB.format(f"exec({tries!r}, {{}})"))
     path = held(tmp_path, "r.tdms", b"TDSm" + bytes(100))
-    assert "(PermissionError)" in refusal(path)
-    assert not (tmp_path / "garbage").exists()
+    with pytest.raises(MeasurementError, match=r"^works\.$"), opened(path, "r.tdms"):
+        pass
+    assert victim.read_text() == "kept"
+    assert list(victim.parent.iterdir()) == [victim]
+    after = victim.stat()
+    assert (after.st_mode, after.st_mtime_ns) == (before.st_mode, before.st_mtime_ns)
 
 
 def test_a_missing_package_is_named(tmp_path, monkeypatch):

@@ -8,8 +8,12 @@ from pathlib import Path
 
 import cmerg
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
+import pyuff
 from asammdf import MDF, Signal
+from nptdms import ChannelObject, TdmsWriter
 from numpy.testing import assert_allclose
 from ridetune.engine.channels import Run
 from ridetune.engine.clocks import even_time
@@ -34,6 +38,11 @@ def folder(tmp_path_factory):
     return made
 
 
+def time_of(table, index):
+    column = table.columns[index]
+    return even_time(column) if column.clock is None else table.values(column.clock)
+
+
 @pytest.mark.parametrize("name", files.WRITERS)
 def test_columns_units_and_times_come_back(folder, name):
     _, kind, off = files.WRITERS[name]
@@ -45,9 +54,7 @@ def test_columns_units_and_times_come_back(folder, name):
             assert (column.unit, column.samples) == (unit, len(values))
             assert_allclose(table.values(index), values, rtol=0, atol=off)
             # Some forms keep the first time and the step, others five digits of every time.
-            clock = column.clock
-            time = even_time(column) if clock is None else table.values(clock)
-            assert_allclose(time, files.TIME, rtol=1e-5, atol=1e-15)
+            assert_allclose(time_of(table, index), files.TIME, rtol=1e-5, atol=1e-15)
 
 
 @pytest.mark.parametrize("name", ["r.csv", "r.mf4", "r.mat", "r73.mat", "r.rsp", "r.zip"])
@@ -134,6 +141,67 @@ def test_the_run_is_cut_to_what_its_clocks_share(tmp_path):
     assert 0.205 <= run.time[0] < 0.215
     assert run.time[-1] == pytest.approx(1.0)
     assert any("Only the time from 0.205 to 1 s has all" in w for w in run.warnings)
+
+
+def test_universal_files_are_in_the_units_of_their_data_set_164(tmp_path):
+    """Of a file in mm and mN, whose factors are file units over SI; an axis that states its unit
+    goes before.
+    """
+    path = tmp_path / "r.uff"
+    file = pyuff.UFF(str(path))
+    units = {"units_code": 5, "length": 1000.0, "force": 1000.0, "temp": 1.0, "temp_offset": 273.15}
+    files.write_set(file, {"type": 164, **units})
+    columns = [("z", 8, ""), ("a", 12, ""), ("f", 13, ""), ("mm", 8, "mm"), ("m", 8, "m")]
+    for name, kind, label in columns:
+        head = {"type": 58, "func_type": 1, "rsp_node": 1, "rsp_dir": 3, "ref_node": 0}
+        axes = {"ordinate_axis_units_lab": label, "ordinate_spec_data_type": kind}
+        head |= {"ref_dir": 0, "id1": name, "abscissa_spec_data_type": 17, "binary": 0}
+        head |= {"orddenom_spec_data_type": 0, "abscissa_axis_units_lab": "s"}
+        data = {"x": files.TIME, "data": files.Z, "abscissa_spacing": 1}
+        files.write_set(file, head | axes | data)
+    with ChildTable(path, "r.uff") as table:
+        assert [one.unit for one in table.columns] == ["m", "m/s^2", "N", "mm", "m"]
+        for index, factor in enumerate((1e-3, 1e-3, 1e-3, 1.0, 1.0)):
+            assert_allclose(table.values(index), factor * files.Z, atol=factor * 5.1e-11)
+        [said] = table.warnings
+    assert said.startswith("m is in m by its axis, but in 0.001 m by the file's units")
+
+
+BEGIN = np.datetime64("2024-03-12T10:00:00.000000")
+LATER = BEGIN + np.timedelta64(1500, "ms")
+
+
+@pytest.mark.parametrize(
+    ("begins", "starts", "said"),
+    [((LATER, BEGIN), (1.75, 0.25), []), ((BEGIN, None), (0.25, 0.25), ["When z1 began"])],
+)
+def test_waveforms_begin_when_they_say(tmp_path, begins, starts, said):
+    with TdmsWriter(tmp_path / "r.tdms") as writer:
+        for number, begin in enumerate(begins):
+            told = {"wf_increment": 0.01, "wf_start_offset": 0.25}
+            dated = {} if begin is None else {"wf_start_time": begin}
+            one = ChannelObject(f"group {number}", f"z{number}", files.Z, {**told, **dated})
+            writer.write_segment([one])
+    with ChildTable(tmp_path / "r.tdms", "r.tdms") as table:
+        assert [column.start for column in table.columns] == pytest.approx(starts)
+        assert [one[:13] for one in table.warnings] == said
+        assert_allclose(time_of(table, 0), starts[0] + files.TIME, rtol=1e-12)
+
+
+def test_dates_of_a_file_count_from_one_beginning(tmp_path):
+    milliseconds = (10 * np.arange(files.Z.size)).astype("timedelta64[ms]")
+    dates = {"A": LATER + milliseconds, "B": BEGIN + milliseconds}
+    with TdmsWriter(tmp_path / "r.tdms") as writer:
+        for group, time in dates.items():
+            z = ChannelObject(group, "z", files.Z)
+            writer.write_segment([ChannelObject(group, "time", time), z])
+    with ChildTable(tmp_path / "r.tdms", "r.tdms") as table:
+        assert_allclose(time_of(table, 1), 1.5 + files.TIME, atol=1e-9)
+        assert_allclose(time_of(table, 3), files.TIME, atol=1e-9)
+    pq.write_table(pa.table({**dates, "z": files.Z}), tmp_path / "r.parquet")
+    with ChildTable(tmp_path / "r.parquet", "r.parquet") as table:
+        assert_allclose(table.values(0), 1.5 + files.TIME, atol=1e-9)
+        assert_allclose(table.values(1), files.TIME, atol=1e-9)
 
 
 @pytest.mark.parametrize(
