@@ -30,26 +30,23 @@ class ParquetTable(Table):
             thrift_container_size_limit=1_000_000,
         )
         samples, listing = int(self._file.metadata.num_rows), Listing(source, kind)
-        fields = {field.name: field for field in self._file.schema_arrow}
         found: list[tuple[tuple[str, ...], Column, int]] = []
-        for leaf in range(self._file.metadata.num_columns):
-            described = self._file.schema.column(leaf)
-            field = fields.get(described.path)
-            if field is None or not _is_number(pa, field.type):
-                listing.leave_out(described.path, "holds no plain numbers")
+        for place, field in enumerate(self._file.schema_arrow):
+            if not _is_number(pa, field.type):
+                listing.leave_out(field.name, "holds no plain numbers")
                 continue
             name, unit = split_title(plain(field.name))
             stated = field.metadata or {}
             unit = first_text(stated.get(b"unit"), stated.get(b"units"), unit)
             unit = "s" if pa.types.is_temporal(field.type) else unit
-            found.append(((name,), Column(name, unit, samples), leaf))
+            found.append(((name,), Column(name, unit, samples), place))
         listing.add_timed(found)
         self.columns, self.warnings = listing.columns(), listing.warnings()
-        self._leaves = listing.places
+        self._places = listing.places
 
     def values(self, index: int) -> Array:
         """The numbers of one column; NaN for what is null."""
-        column = self._file.reader.read_column(self._leaves[index])
+        column = self._file.reader.read_column(self._places[index])
         if self._pa.types.is_decimal(column.type):
             column = column.cast(self._pa.float64())
         return numbers(
