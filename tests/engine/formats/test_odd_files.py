@@ -3,12 +3,16 @@
 Oracle: what was written beside the oddity, and what was done to the file.
 """
 
+import h5py
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from numpy.testing import assert_allclose
 from ridetune.engine.errors import MeasurementError
+from ridetune.engine.formats.listing import Listing, plain
 from ridetune.engine.formats.readers import read_as
+from ridetune.engine.formats.table import Column
 
 from tests import files_of_kinds as files
 
@@ -34,3 +38,28 @@ def test_a_nested_column_of_parquet_shifts_none_behind_it(tmp_path):
     found = by_name(table(tmp_path / "r.parquet", "Parquet"))
     assert_allclose(found["chassis.z"][1], files.Z)
     assert_allclose(found["a_x"][1], files.A_X)
+
+
+def test_what_is_left_out_shifts_no_clock(tmp_path):
+    """An empty matrix stands before the times, in the order of the file."""
+    with h5py.File(tmp_path / "r.h5", "w") as file:
+        file["a"] = np.zeros((0, 3))
+        file["chassis.z"] = files.Z
+        file["other"] = np.ones(50)
+        file["time"] = files.TIME
+    found = table(tmp_path / "r.h5", "HDF5")
+    clock = by_name(found)["chassis.z"][0].clock
+    assert clock is not None
+    assert found.columns[clock].name == "time"
+
+
+@pytest.mark.parametrize("name", ["a\u2028b", "a\nb", "a\x85b", "a\u202eb"])
+def test_a_name_is_one_line_that_runs_one_way(name):
+    assert plain(name) == "a b"
+
+
+@pytest.mark.parametrize("step", [1e308, 0.0, -1.0, float("nan"), float("inf")])
+def test_a_step_that_is_none_tells_no_time(step):
+    listing = Listing("r.rsp", "RPC III")
+    listing.add(Column("z", "m", 50, step=step), None)
+    assert listing.columns()[0].step is None
