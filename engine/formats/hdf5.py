@@ -26,6 +26,9 @@ DEEPEST = 20
 MOST_OBJECTS = 100_000
 """Most groups and data sets that are looked at."""
 
+DAMAGE = (OSError, RuntimeError, KeyError, TypeError, ValueError)
+"""What h5py raises at a part of a file that cannot be read."""
+
 _UNITS = ("unit", "units", "Unit", "Units", "UNIT", "unit_string")
 _BOOKKEEPING = ("#refs#", "#subsystem#")
 
@@ -62,11 +65,14 @@ class Hdf5File(Table):
             if not isinstance(group.get(name, getlink=True), self._h5py.HardLink):
                 self._listing.leave_out(shown, "is a link, which is not followed")
                 continue
-            item = group[name]
-            if isinstance(item, self._h5py.Group):
-                self._walk(item, here)
-            elif isinstance(item, self._h5py.Dataset):
-                self._take(item, here)
+            try:
+                item = group[name]
+                if isinstance(item, self._h5py.Group):
+                    self._walk(item, here)
+                elif isinstance(item, self._h5py.Dataset):
+                    self._take(item, here)
+            except DAMAGE:
+                self._listing.leave_out(shown, "is damaged or of an unusual type")
 
     def _take(self, data: Any, path: tuple[str, ...]) -> None:
         name, why = self._name(path), self._unreadable(data)
@@ -106,7 +112,7 @@ class Hdf5File(Table):
             return "is put together from other files, which are not opened"
         if created.get_external_count():
             return "is kept in another file, which is not opened"
-        if data.attrs.get("MATLAB_class") in (b"char", b"cell", "char", "cell"):
+        if self._text(data, "MATLAB_class") in ("char", "cell"):
             return "is text"
         if data.dtype.names is None and data.dtype.kind not in "iufb":
             return "holds no plain numbers"
@@ -121,9 +127,12 @@ class Hdf5File(Table):
     def _text(self, data: Any, key: str) -> str:
         if key not in data.attrs:
             return ""
-        if data.attrs.get_id(key).get_storage_size() > 10_000:
+        try:
+            if data.attrs.get_id(key).get_storage_size() > 10_000:
+                return ""
+            value = data.attrs[key]
+        except (TypeError, ValueError, OSError, RuntimeError):  # empty, or of a type unknown
             return ""
-        value = data.attrs[key]
         return plain(value) if isinstance(value, (str, bytes)) else ""
 
     def _name(self, path: tuple[str, ...]) -> str:

@@ -53,6 +53,39 @@ def test_what_is_left_out_shifts_no_clock(tmp_path):
     assert found.columns[clock].name == "time"
 
 
+ATTRIBUTES = {
+    "MATLAB_class": np.ones(2),
+    "unit": np.zeros(2, dtype=[("a", "f8")]),
+    "units": h5py.Empty("f8"),
+    "Unit": b"\xff\xfe" * 9000,
+    "comment": ["a", "b"],
+}
+
+
+def test_odd_attributes_of_a_data_set_are_passed_over(tmp_path):
+    with h5py.File(tmp_path / "r.h5", "w", libver="latest") as file:
+        file["chassis.z"] = files.Z
+        for name, value in ATTRIBUTES.items():
+            file["chassis.z"].attrs[name] = value
+    column, values = by_name(table(tmp_path / "r.h5", "HDF5"))["chassis.z"]
+    assert (column.unit, column.comment) == ("", "")
+    assert_allclose(values, files.Z)
+
+
+def test_a_damaged_data_set_of_hdf5_leaves_the_others(tmp_path):
+    """Zeros over the head of one."""
+    with h5py.File(tmp_path / "r.h5", "w") as file:
+        for name in ("a", "chassis.z"):
+            file[name] = files.Z
+        at = h5py.h5o.get_info(file["a"].id).addr
+    with (tmp_path / "r.h5").open("r+b") as stream:
+        stream.seek(at)
+        stream.write(bytes(16))
+    found = table(tmp_path / "r.h5", "HDF5")
+    assert list(by_name(found)) == ["chassis.z"]
+    assert "a is damaged or of an unusual type" in found.warnings[0]
+
+
 @pytest.mark.parametrize("name", ["a\u2028b", "a\nb", "a\x85b", "a\u202eb"])
 def test_a_name_is_one_line_that_runs_one_way(name):
     assert plain(name) == "a b"
