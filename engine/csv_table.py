@@ -45,6 +45,9 @@ _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x19\x1b-\x1f]")
 _NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
 _TITLE = re.compile(r"\s*(?P<name>[^\[\]()]*?)\s*(?:[\[(]\s*(?P<unit>[^\[\]]*?)\s*[\])])?\s*")
 _GAPS = ("", "nan", "-nan", "n/a", "null")
+_SWAPPED = ("\u0a0d", "\u0a00")
+"""What a line end of UTF-16 is where a byte was put in; no characters of any script."""
+
 _MARKS = (
     (b"\xff\xfe\x00\x00", "utf-32"),
     (b"\x00\x00\xfe\xff", "utf-32"),
@@ -195,13 +198,19 @@ class CsvTable:
 
     def _lines(self) -> Iterator[tuple[int, str]]:
         """Every line of the file with its number, counted from 1."""
-        text = self._text()
+        text, wide = self._text(), self._encoding.startswith("utf-16")
         try:
             for number, line in enumerate(iter(partial(text.readline, LONGEST_LINE + 1), ""), 1):
                 if len(line) > LONGEST_LINE:
                     raise self._refuse(
                         f" is longer than {LONGEST_LINE} characters; export fewer columns, one row"
                         " a sample",
+                        number,
+                    )
+                if wide and (_SWAPPED[0] in line or _SWAPPED[1] in line):
+                    raise self._refuse(
+                        ": the text is damaged by a conversion of line ends; transfer it again in"
+                        " binary mode",
                         number,
                     )
                 yield number, line

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..errors import MeasurementError
 from .kinds import ERG_ZIP, erg_pair
-from .listing import Listing, first_text, plain
+from .listing import CONVERTED, Listing, first_text, line_ends_converted, plain
 from .table import Array, Column, Table
 
 HEAD_BYTES = 16
@@ -57,13 +57,16 @@ class ErgFile(Table):
             raise MeasurementError(
                 f"{source}: this is no CarMaker recording; choose the .erg file."
             )
-        samples = (len(data) - HEAD_BYTES) // max(record.itemsize, 1)
+        samples, rest = divmod(len(data) - HEAD_BYTES, max(record.itemsize, 1))
         said = int.from_bytes(data[10:12].tobytes(), "little" if order == "<" else "big")
         if said not in (0, record.itemsize & 0xFFFF):
             raise MeasurementError(
                 f"{source}: its records are {said} bytes long but described as {record.itemsize};"
                 " give the .erg.info that was written with it."
             )
+        added = line_ends_converted(data[HEAD_BYTES:])
+        if added and (added - rest) % record.itemsize == 0:
+            raise MeasurementError(f"{source}: {CONVERTED}.")
         self._records = data[HEAD_BYTES : HEAD_BYTES + samples * record.itemsize].view(record)
         listing = Listing(source, self.kind)
         found = []
@@ -76,6 +79,10 @@ class ErgFile(Table):
                 listing.leave_out(name, "holds no plain numbers")
         listing.add_timed(found)
         self.columns, self.warnings = listing.columns(), listing.warnings()
+        if rest:
+            self.warnings += (
+                "The file ends within a record; it was cut short or changed in transfer.",
+            )
         self._places = listing.places
 
     def _beside(self, path: Path) -> tuple[Any, bytes]:
@@ -120,10 +127,10 @@ class ErgFile(Table):
             gap = _BYTES.fullmatch(said)
             form = f"S{gap[1]}" if gap else _TYPES.get(said)
             if form is None or name in factors:
+                what = "there twice" if form else f"of the unknown type '{plain(said)}'"
                 raise MeasurementError(
                     f"{self.source}: quantity {number} of its description, {plain(name)}, is"
-                    f" {'there twice' if form else f'of the unknown type {plain(said)!r}'}; give"
-                    " the .erg.info that was written with it."
+                    f" {what}; give the .erg.info that was written with it."
                 )
             # Bytes that only fill up a record have a name of dollar signs or none.
             key = f"\0{number}" if gap and name.strip("$ ") in ("", "none") else name
@@ -149,7 +156,7 @@ class ErgFile(Table):
         except ValueError as error:
             raise MeasurementError(
                 f"{self.source}: Quantity.{plain(name)}.{key} of its description is"
-                f" {plain(text)!r}; write a number."
+                f" '{plain(text)}'; write a number."
             ) from error
 
     def values(self, index: int) -> Array:

@@ -25,8 +25,15 @@ WIDEST = 64
 LONGEST_TEXT = 200
 """Longest name, unit or comment that is kept, characters."""
 
+CONVERTED = (
+    "its numbers are damaged by a conversion of line ends, as a transfer of text does; transfer it"
+    " again in binary mode"
+)
+"""The sentence behind a file's name."""
+
 _TIME = re.compile(r"(time|t|zeit|temps|timestamps?|time_?s(ec)?|abtastzeit)", re.IGNORECASE)
 _SHOWN = 5
+_PIECE = 1 << 20
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]+")
 """Control characters, ends of lines, turns of the direction of writing, halves of characters."""
 
@@ -146,6 +153,21 @@ def numbers(values: Any) -> Array:
         seconds = values.astype("timedelta64[ns]").astype(np.float64) * 1e-9
         return np.where(np.isnat(values), np.nan, seconds)
     return np.ascontiguousarray(values, dtype=np.float64)
+
+
+def line_ends_converted(data: Any) -> int:
+    """How many bytes a conversion of line ends has put in, where it looks like one; else 0.
+
+    data : bytes of numbers, of which a few line feeds would follow other than a carriage return
+    """
+    added, last = 0, b""
+    for begin in range(0, len(data), _PIECE):
+        piece = last + data[begin : begin + _PIECE].tobytes()
+        feeds = piece.count(b"\n") - last.count(b"\n")
+        if feeds != piece.count(b"\r\n"):
+            return 0
+        added, last = added + feeds, piece[-1:]
+    return added
 
 
 def first_text(*texts: Any) -> str:

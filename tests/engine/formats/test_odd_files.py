@@ -10,9 +10,10 @@ import pyarrow.parquet as pq
 import pytest
 from numpy.testing import assert_allclose
 from ridetune.engine.errors import MeasurementError
-from ridetune.engine.formats.listing import Listing, plain
+from ridetune.engine.formats.listing import Listing, line_ends_converted, plain
 from ridetune.engine.formats.readers import read_as
 from ridetune.engine.formats.table import Column
+from ridetune.engine.measurement import parse_run
 
 from tests import files_of_kinds as files
 
@@ -89,6 +90,74 @@ def test_a_damaged_data_set_of_hdf5_leaves_the_others(tmp_path):
 @pytest.mark.parametrize("name", ["a\u2028b", "a\nb", "a\x85b", "a\u202eb"])
 def test_a_name_is_one_line_that_runs_one_way(name):
     assert plain(name) == "a b"
+
+
+@pytest.mark.filterwarnings("ignore:File contains")
+@pytest.mark.parametrize("name", ["r.rsp", "r.erg", "r.zip"])
+def test_converted_line_ends_of_plain_numbers_are_recognized(tmp_path, name):
+    """Each line feed made two bytes; the numbers hold some."""
+    write, kind, _ = files.WRITERS[name]
+    write(tmp_path / name)
+    wrong = tmp_path / name
+    if name == "r.zip":
+        wrong, kind = tmp_path / "inner.erg", "CarMaker ERG"
+    data = wrong.read_bytes()
+    assert b"\n" in data
+    wrong.write_bytes(data.replace(b"\n", b"\r\n"))
+    assert "a conversion of line ends" in refusal(lambda: table(wrong, kind))
+
+
+@pytest.mark.parametrize("even", [True, False])
+def test_converted_line_ends_of_a_binary_universal_file_are_recognized(tmp_path, even):
+    """As it is written by Windows, all of its text ends in two bytes, and it is sound."""
+    files.uff(tmp_path / "r.uff", binary=True, even=even)
+    data = (tmp_path / "r.uff").read_bytes()
+    for before, after in ((b"NONE\n", b"NONE\r\n"), (b"\n", b"\r\n")):
+        (tmp_path / "r.uff").write_bytes(data.replace(before, after))
+        found = table(tmp_path / "r.uff", "UFF58")
+        if before == b"NONE\n":
+            assert_allclose(by_name(found)["chassis.z"][1], files.Z)
+    assert "data set 1: its numbers are damaged" in refusal(lambda: found.values(0))
+
+
+@pytest.mark.parametrize(
+    ("data", "added"),
+    [
+        (b"ab\r\nc\r\n", 2),
+        (b"ab\nc\r\n", 0),
+        (b"\nab\r\n", 0),
+        (b"abc", 0),
+        (b"a" * ((1 << 20) - 1) + b"\r\n" + b"b" * (1 << 20) + b"\r\n", 2),
+    ],
+)
+def test_line_ends_put_in_are_counted(data, added):
+    """The last lie on either side of where the reading is cut."""
+    assert line_ends_converted(np.frombuffer(data, np.uint8)) == added
+
+
+def test_a_carmaker_recording_that_ends_within_a_record_is_told(tmp_path):
+    files.erg(tmp_path / "r.erg")
+    data = (tmp_path / "r.erg").read_bytes()
+    (tmp_path / "r.erg").write_bytes(data[:-5])
+    found = table(tmp_path / "r.erg", "CarMaker ERG")
+    assert found.columns[0].samples == 49
+    assert any("ends within a record" in said for said in found.warnings)
+
+
+def test_a_time_history_shorter_than_it_declares_is_refused(tmp_path):
+    files.rpc(tmp_path / "r.rsp")
+    data = (tmp_path / "r.rsp").read_bytes()
+    (tmp_path / "r.rsp").write_bytes(data[:-7])
+    said = refusal(lambda: table(tmp_path / "r.rsp", "RPC III"))
+    assert "header expects more data than present; export it again" in said
+
+
+def test_converted_line_ends_of_utf_16_are_recognized(tmp_path):
+    """A byte put in at each line end shifts every other line by half a character."""
+    files.csv(tmp_path / "r.csv")
+    data = (tmp_path / "r.csv").read_text().encode("utf-16-le").replace(b"\n", b"\r\n")
+    said = refusal(lambda: parse_run(data, "r.csv"))
+    assert said.startswith("r.csv: line 1: the text is damaged by a conversion of line ends")
 
 
 @pytest.mark.parametrize("step", [1e308, 0.0, -1.0, float("nan"), float("inf")])
