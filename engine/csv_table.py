@@ -34,6 +34,9 @@ MOST_COLUMNS = 1000
 MOST_NUMBERS = 25_000_000
 """Most numbers read from one file: samples times columns in use; 200 MB of memory."""
 
+LARGEST_NUMBER = 1e100
+"""Beyond it a number is no measurement, and the square of its square no number."""
+
 LONGEST_LINE = 100_000
 """Longest line, characters."""
 
@@ -117,7 +120,7 @@ class CsvTable:
         with np.errstate(over="ignore"):
             table *= factors
             table += offsets
-        finite = np.isfinite(table)
+        finite = np.abs(table) < LARGEST_NUMBER
         if not finite.all():
             row, column = divmod(int(np.argmin(finite)), len(columns))
             line, text = self._row(row, indices)

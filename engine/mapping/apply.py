@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..channels import Run, channel
 from ..clocks import ROUNDING, Clocks, Series, clock_key, even_time, joined, way_of_time
+from ..csv_table import LARGEST_NUMBER
 from ..errors import MeasurementError
 from ..formats.table import Column, Table
 from ..plausibility import (
@@ -112,13 +113,15 @@ class _Times:
     def _mapped(self) -> Array:
         assert self._entry is not None
         factor, offset = self._entry.to_si()
-        return factor * self._table.values(self._index) + offset
+        with np.errstate(over="ignore", invalid="ignore"):
+            return factor * self._table.values(self._index) + offset
 
     def _own(self, column: Column) -> Array:
         if column.clock is None:
             return even_time(column)
         index, factor, offset = way_of_time(self._table, column.clock)
-        return factor * self._table.values(index) + offset
+        with np.errstate(over="ignore", invalid="ignore"):
+            return factor * self._table.values(index) + offset
 
 
 def _series(
@@ -144,7 +147,7 @@ def _series(
     factor, offset = entry.to_si()
     with np.errstate(over="ignore", invalid="ignore"):
         numbers = factor * values[measured] + offset
-    if not np.isfinite(numbers).all():
+    if not np.all(np.abs(numbers) < LARGEST_NUMBER):
         raise MeasurementError(f"{place} holds a number too large for its unit; correct it.")
     if numbers.min() == numbers.max():
         warnings.append(f"{entry.column}, mapped as {entry.channel}, never changes.")

@@ -8,12 +8,13 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from nptdms import ChannelObject, TdmsWriter
 from numpy.testing import assert_allclose
 from ridetune.engine.errors import MeasurementError
 from ridetune.engine.formats.listing import Listing, line_ends_converted, plain
 from ridetune.engine.formats.readers import read_as
 from ridetune.engine.formats.table import Column
-from ridetune.engine.measurement import parse_run
+from ridetune.engine.measurement import parse_run, read_run
 
 from tests import files_of_kinds as files
 
@@ -158,6 +159,16 @@ def test_converted_line_ends_of_utf_16_are_recognized(tmp_path):
     data = (tmp_path / "r.csv").read_text().encode("utf-16-le").replace(b"\n", b"\r\n")
     said = refusal(lambda: parse_run(data, "r.csv"))
     assert said.startswith("r.csv: line 1: the text is damaged by a conversion of line ends")
+
+
+def test_numbers_that_measure_nothing_are_refused_where_they_stand(tmp_path):
+    z = files.Z.copy()
+    z[7] = 1e300
+    with TdmsWriter(tmp_path / "r.tdms") as writer:
+        properties = {"wf_increment": 0.01, "unit_string": "m"}
+        writer.write_segment([ChannelObject("ride", "chassis.z", z, properties)])
+    said = refusal(lambda: read_run(tmp_path / "r.tdms"))
+    assert "sample 8, column chassis.z: 1e+300 is too large" in said
 
 
 @pytest.mark.parametrize("step", [1e308, 0.0, -1.0, float("nan"), float("inf")])
