@@ -44,6 +44,7 @@ LONGEST_TITLE = 200
 """Longest title of a column that is taken apart, characters."""
 
 _HEAD = 65_536
+_NO_SAMPLES = "no samples stand below the header; export them with it"
 _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x19\x1b-\x1f]")
 _NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
 _TITLE = re.compile(r"\s*(?P<name>[^\[\]()]*?)\s*(?:[\[(]\s*(?P<unit>[^\[\]]*?)\s*[\])])?\s*")
@@ -94,7 +95,7 @@ class CsvTable:
         with closing(self._rows(columns)) as rows:
             first = next(rows, None)
             if first is None:
-                raise self._refuse("no samples stand below the header; export them with it")
+                raise self._refuse(_NO_SAMPLES)
             try:
                 table = np.loadtxt(
                     texts(chain([first], rows)),
@@ -160,8 +161,11 @@ class CsvTable:
         return math.nan
 
     def count(self) -> int:
-        """Number of rows with data."""
-        return sum(1 for _ in self._rows([]))
+        """Number of rows with data, at least one."""
+        rows = sum(1 for _ in self._rows([]))
+        if rows == 0:
+            raise self._refuse(_NO_SAMPLES)
+        return rows
 
     def line_of(self, row: int) -> int:
         """The line of the file, counted from 1, that holds a row of `numbers`, counted from 0."""
@@ -328,9 +332,9 @@ class CsvTable:
     def _bad_number(
         self, line: int, index: int, cell: str, remedy: str, what: str = "not a number"
     ) -> MeasurementError:
-        text = ascii(cell.strip())
-        text = text if len(text) <= 32 else f"{text[:28]}...'"
-        return self._refuse(f", column {self._title(index)}: {text} is {what}; {remedy}", line)
+        text = "".join(one if one.isprintable() else "\ufffd" for one in cell.strip())
+        text = text if len(text) <= 30 else f"{text[:27]}..."
+        return self._refuse(f", column {self._title(index)}: '{text}' is {what}; {remedy}", line)
 
     def _title(self, index: int) -> str:
         return self.header[index] or f"number {index + 1}"

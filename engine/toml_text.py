@@ -28,7 +28,9 @@ def parse_toml(data: bytes, source: str) -> dict[str, Any]:
     try:
         return tomllib.loads(data.decode("utf-8-sig").replace("\r\n", "\n"))
     except (ValueError, RecursionError) as error:
-        raise MeasurementError(f"{source}: not valid TOML ({error}); correct it.") from error
+        # A control character is told as Python writes it.
+        said = str(error).replace("\\x", "U+00")
+        raise MeasurementError(f"{source}: not valid TOML ({said}); correct it.") from error
 
 
 def toml_value(value: Any) -> str:

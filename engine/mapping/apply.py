@@ -69,11 +69,11 @@ def _found(mapping: ChannelMapping, table: Table) -> dict[str, tuple[MappedColum
     for entry in mapping.columns:
         where = places.of(entry.column, entry.group)
         if len(where) != 1:
-            group = f" in the group {entry.group!r}" if entry.group else ""
+            group = f" in the group '{entry.group}'" if entry.group else ""
             what = f"has {len(where)} columns" if where else "has no column"
             remedy = "name its group" if where else "map another one"
             raise MeasurementError(
-                f"{table.source}: the file {what} called {entry.column!r}{group}, which the"
+                f"{table.source}: the file {what} called '{entry.column}'{group}, which the"
                 f" mapping takes for {entry.channel}; {remedy}."
             )
         found[entry.channel] = entry, where[0]

@@ -3,6 +3,8 @@
 Oracle: what was written beside the oddity, and what was done to the file.
 """
 
+import io
+
 import h5py
 import numpy as np
 import pyarrow as pa
@@ -10,7 +12,8 @@ import pyarrow.parquet as pq
 import pytest
 from nptdms import ChannelObject, TdmsWriter
 from numpy.testing import assert_allclose
-from ridetune.engine.errors import MeasurementError
+from ridetune.engine.errors import MeasurementError, RideError
+from ridetune.engine.formats.csv_file import CsvFile
 from ridetune.engine.formats.listing import Listing, line_ends_converted, plain
 from ridetune.engine.formats.readers import read_as
 from ridetune.engine.formats.table import Column
@@ -161,6 +164,19 @@ def test_converted_line_ends_of_utf_16_are_recognized(tmp_path):
     assert said.startswith("r.csv: line 1: the text is damaged by a conversion of line ends")
 
 
+def test_a_text_without_numbers_has_no_columns():
+    found = CsvFile(io.BytesIO(b"time [s],chassis.z [mm]\n\n"), "r.csv")
+    assert "no samples stand below the header" in refusal(lambda: found.columns)
+
+
+def test_a_cell_is_shown_as_it_is_written():
+    for cell, shown in (("2\u00b0", "2\u00b0"), ("\x7f3", "\ufffd3"), ("4\ud800", "4\ufffd")):
+        data = f"time [s],chassis.z [mm]\n0,1\n1,{cell}\n".encode("utf-8", "surrogatepass")
+        said = refusal(lambda: parse_run(data, "r.csv"))
+        assert f"line 3, column chassis.z [mm]: '{shown}" in said
+        assert "is not a number; write a plain decimal number." in said
+
+
 def test_numbers_that_measure_nothing_are_refused_where_they_stand(tmp_path):
     z = files.Z.copy()
     z[7] = 1e300
@@ -176,3 +192,8 @@ def test_a_step_that_is_none_tells_no_time(step):
     listing = Listing("r.rsp", "RPC III")
     listing.add(Column("z", "m", 50, step=step), None)
     assert listing.columns()[0].step is None
+
+
+def test_an_error_is_one_line_whatever_it_repeats():
+    said = str(RideError(f"r.json: a\nb\u2028c\0{'x' * 500} is not known."))
+    assert said == f"r.json: a b c {'x' * 160}... is not known."
