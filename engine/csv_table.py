@@ -337,7 +337,7 @@ class CsvTable:
         return self._refuse(f", column {self._title(index)}: '{text}' is {what}; {remedy}", line)
 
     def _title(self, index: int) -> str:
-        return self.header[index] or f"number {index + 1}"
+        return self.header[index][:LONGEST_TITLE] or f"number {index + 1}"
 
 
 def _mended(line: str) -> str:

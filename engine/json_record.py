@@ -54,7 +54,8 @@ class RecordReader:
         """Refuse a key of an object that is none of those known."""
         for key in data:
             if key not in known:
-                raise self.refuse(_join(path, str(key)), f"is not known; {_hint(key, known)}")
+                shown = str(key) if str(key).strip() else '""'
+                raise self.refuse(_join(path, shown), f"is not known; {_hint(key, known)}")
 
     def value(self, hint: Any, data: Any, path: str, accepted: Range | None = None) -> Any:
         """One value as its type, or an error that says what it should be."""

@@ -38,8 +38,9 @@ def test_empty_notes_state_nothing():
     ("text", "message"),
     [
         (b"[noise", "r.toml: not valid TOML (Expected ']'"),
-        (b"\xff", "r.toml: not valid TOML ("),
-        (b"a=" + b"[" * 100_000, "r.toml: not valid TOML ("),
+        (b"a=1\xff", "r.toml: not UTF-8 text (byte 4); save it as TOML in UTF-8."),
+        (b"a=" + b"[" * 100_000, "r.toml: nested too deeply"),
+        (b"[a.b]\n[a.b]\n", "r.toml: not valid TOML (Cannot declare [a.b] twice (at line 2"),
         (b"[noise]\n" + b"a." * 5000 + b"b = 1", "r.toml: line 2 has more than 200 dots"),
         (b" " * (LARGEST_FILE + 1), "r.toml: larger than 1 MB"),
         (b"[nosie]\na = 1", "r.toml: nosie is not known; did you mean noise?"),

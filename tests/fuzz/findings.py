@@ -21,7 +21,7 @@ LONGEST = 1200
 
 GARBAGE = re.compile(
     r"Traceback|(^|[(\[:=] ?)b['\"]|\\x[0-9a-f]{2}|<class|object at 0x|dtype\("
-    r"|array\(|np\.\w+\(|/tmp/"
+    r"|array\(|codec|recursion|',\)|np\.\w+\(|/tmp/"
 )
 """What only a programmer understands."""
 
