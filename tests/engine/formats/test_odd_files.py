@@ -18,6 +18,7 @@ from ridetune.engine.formats.listing import Listing, line_ends_converted, plain
 from ridetune.engine.formats.readers import read_as
 from ridetune.engine.formats.table import Column
 from ridetune.engine.measurement import parse_run, read_run
+from scipy.io import savemat
 
 from tests import files_of_kinds as files
 
@@ -109,6 +110,16 @@ def test_converted_line_ends_of_plain_numbers_are_recognized(tmp_path, name):
     assert b"\n" in data
     wrong.write_bytes(data.replace(b"\n", b"\r\n"))
     assert "a conversion of line ends" in refusal(lambda: table(wrong, kind))
+
+
+def test_converted_line_ends_of_a_mat_file_of_one_variable_are_recognized(tmp_path):
+    """The one line feed lies in the numbers, where nothing but their number is told."""
+    savemat(tmp_path / "r.mat", {"x": np.array([1.0, np.frombuffer(b"\n" * 8)[0], 3.0])})
+    data = (tmp_path / "r.mat").read_bytes()
+    assert data.count(b"\n") == 8
+    (tmp_path / "r.mat").write_bytes(data.replace(b"\n", b"\r\n", 1))
+    with pytest.raises(ValueError, match="bytes behind the last variable"):
+        table(tmp_path / "r.mat", "MAT 5")
 
 
 @pytest.mark.parametrize("even", [True, False])
