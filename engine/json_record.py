@@ -7,6 +7,7 @@ starts with the source and the dotted path of the field and says what to do.
 """
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass
 from difflib import get_close_matches
@@ -76,6 +77,8 @@ class RecordReader:
         number = _to_float(data)
         if accepted is not None and not accepted.holds(number):
             raise self.refuse(path, f"is {describe(data)}, but must lie {accepted}; correct it.")
+        if not math.isfinite(number):
+            raise self.refuse(path, f"is {describe(data)}, but must be finite; correct it.")
         return int(number) if hint is int else number
 
     def _one_of(self, options: Sequence[Any], data: Any, path: str, accepted: Range | None) -> Any:
