@@ -31,6 +31,9 @@ CONVERTED = (
 )
 """The sentence behind a file's name."""
 
+SPENT = ", as a damaged file may; export it again, shorter or with fewer channels"
+"""What to do where reading takes too much time or memory."""
+
 _TIME = re.compile(r"(time|t|zeit|temps|timestamps?|time_?s(ec)?|abtastzeit)", re.IGNORECASE)
 _SHOWN = 5
 _PIECE = 1 << 20
