@@ -339,7 +339,7 @@ def channel(name: str) -> ChannelInfo:
     if info is None:
         near = near_channel(name)
         hint = f"did you mean {near}?" if near else "see the table of channels."
-        raise MeasurementError(f"No channel is called {name!r}; {hint}")
+        raise MeasurementError(f"No channel is called '{name}'; {hint}")
     return info
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .csv_table import LARGEST_NUMBER
 from .errors import MeasurementError
 from .formats.kinds import CSV
 from .formats.table import MOST_NUMBERS, Column, Table
@@ -75,6 +76,7 @@ class Clocks:
         return self._read[key]
 
     def _checked(self, time: Array, names: str) -> Array:
+        time = np.where(np.abs(time) < LARGEST_NUMBER, time, np.nan)
         known = np.flatnonzero(np.isfinite(time))
         if known.size < 2:
             raise MeasurementError(

@@ -37,12 +37,16 @@ MOST_COLUMNS = 1000
 MOST_NUMBERS = 25_000_000
 """Most numbers read from one file: samples times columns in use; 200 MB of memory."""
 
+LARGEST_NUMBER = 1e100
+"""Beyond it a number is no measurement, and the square of its square no number."""
+
 LONGEST_LINE = 100_000
 """Longest line, characters."""
 
 LONGEST_TITLE = 200
 """Longest title of a column that is taken apart, characters."""
 
+_NO_SAMPLES = "no samples stand below the header; export them with it"
 _NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
 _DIGITS = re.compile(r"\s*[+-]?[\d.,]*\d[\d.,]*([eE][+-]?\d+)?\s*", re.ASCII)
 _WITH_COMMA = re.compile(r"\s*[+-]?\d+,\d+([eE][+-]?\d+)?\s*", re.ASCII)
@@ -52,6 +56,8 @@ _LOOKED_AT = 1000
 
 _TITLE = re.compile(r"\s*(?P<name>[^\[\]()]*?)\s*(?:[\[(]\s*(?P<unit>[^\[\]]*?)\s*[\])])?\s*")
 _GAPS = ("", "nan", "-nan", "n/a", "null", "-", "--", "---")
+_SWAPPED = ("\u0a0d", "\u0a00")
+"""What a line end of UTF-16 is where a byte was put in; no characters of any script."""
 
 
 class CsvTable:
@@ -93,7 +99,7 @@ class CsvTable:
         with closing(self._rows(columns)) as rows:
             first = next(rows, None)
             if first is None:
-                raise self._refuse("no samples stand below the header; export them with it")
+                raise self._refuse(_NO_SAMPLES)
             try:
                 table = np.loadtxt(
                     texts(chain([first], rows)),
@@ -119,7 +125,7 @@ class CsvTable:
         with np.errstate(over="ignore"):
             table *= factors
             table += offsets
-        finite = np.isfinite(table)
+        finite = np.abs(table) < LARGEST_NUMBER
         if not finite.all():
             row, column = divmod(int(np.argmin(finite)), len(columns))
             line, text = self._row(row, indices)
@@ -162,8 +168,11 @@ class CsvTable:
         return math.nan
 
     def count(self) -> int:
-        """Number of rows with data."""
-        return sum(1 for _ in self._rows([]))
+        """Number of rows with data, at least one."""
+        rows = sum(1 for _ in self._rows([]))
+        if rows == 0:
+            raise self._refuse(_NO_SAMPLES)
+        return rows
 
     def line_of(self, row: int) -> int:
         """The line of the file, counted from 1, that holds a row of `numbers`, counted from 0."""
@@ -185,13 +194,19 @@ class CsvTable:
 
     def _lines(self) -> Generator[tuple[int, str], None, None]:
         """Every line of the file with its number, counted from 1."""
-        text = self._text()
+        text, wide = self._text(), self._encoding.startswith("utf-16")
         try:
             for number, line in enumerate(iter(partial(text.readline, LONGEST_LINE + 1), ""), 1):
                 if len(line) > LONGEST_LINE:
                     raise self._refuse(
                         f" is longer than {LONGEST_LINE} characters; export fewer columns, one row"
                         " a sample",
+                        number,
+                    )
+                if wide and (_SWAPPED[0] in line or _SWAPPED[1] in line):
+                    raise self._refuse(
+                        ": the text is damaged by a conversion of line ends; transfer it again in"
+                        " binary mode",
                         number,
                     )
                 yield number, line.replace("\u2212", "-")
@@ -379,12 +394,12 @@ class CsvTable:
     def _bad_number(
         self, line: int, index: int, cell: str, remedy: str, what: str = "not a number"
     ) -> MeasurementError:
-        text = ascii(cell.strip())
-        text = text if len(text) <= 32 else f"{text[:28]}...'"
-        return self._refuse(f", column {self._title(index)}: {text} is {what}; {remedy}", line)
+        text = "".join(one if one.isprintable() else "\ufffd" for one in cell.strip())
+        text = text if len(text) <= 30 else f"{text[:27]}..."
+        return self._refuse(f", column {self._title(index)}: '{text}' is {what}; {remedy}", line)
 
     def _title(self, index: int) -> str:
-        return self.header[index] or f"number {index + 1}"
+        return self.header[index][:LONGEST_TITLE] or f"number {index + 1}"
 
 
 def _mended(line: str) -> str:

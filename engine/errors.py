@@ -4,11 +4,23 @@ A message names the place (file, line, field, channel), says what is wrong there
 How a numerical method ended is not an error: a poor fit is a result.
 """
 
+import re
+
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]+")
+_LONG = re.compile(r"(\S{160})\S{40,}")
+
 
 class RideError(Exception):
-    """An input or a request that the caller can mend; `str(error)` is the sentence to show."""
+    """An input or a request that the caller can mend; `str(error)` is the sentence to show.
+
+    A name, a key or a text of a file that it repeats may be anything: control characters and ends
+    of lines become spaces, and what no word is so long as is shortened.
+    """
 
     code = "ride"
+
+    def __init__(self, sentence: str = ""):
+        super().__init__(_LONG.sub(r"\1...", _CONTROL.sub(" ", sentence)))
 
 
 class VehicleError(RideError):

@@ -7,6 +7,7 @@ starts with the source and the dotted path of the field and says what to do.
 """
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass
 from difflib import get_close_matches
@@ -54,7 +55,8 @@ class RecordReader:
         """Refuse a key of an object that is none of those known."""
         for key in data:
             if key not in known:
-                raise self.refuse(_join(path, str(key)), f"is not known; {_hint(key, known)}")
+                shown = str(key) if str(key).strip() else '""'
+                raise self.refuse(_join(path, shown), f"is not known; {_hint(key, known)}")
 
     def value(self, hint: Any, data: Any, path: str, accepted: Range | None = None) -> Any:
         """One value as its type, or an error that says what it should be."""
@@ -75,6 +77,8 @@ class RecordReader:
         number = _to_float(data)
         if accepted is not None and not accepted.holds(number):
             raise self.refuse(path, f"is {describe(data)}, but must lie {accepted}; correct it.")
+        if not math.isfinite(number):
+            raise self.refuse(path, f"is {describe(data)}, but must be finite; correct it.")
         return int(number) if hint is int else number
 
     def _one_of(self, options: Sequence[Any], data: Any, path: str, accepted: Range | None) -> Any:

@@ -212,7 +212,7 @@ def parameter(name: str) -> Parameter:
         hint = f"did you mean {row.name if '.' in near[0] else row.symbol}?"
     else:
         hint = f"there are {', '.join(ALL_NAMES)}."
-    raise ParameterError(f"No parameter is called {name!r}; {hint}")
+    raise ParameterError(f"No parameter is called '{name}'; {hint}")
 
 
 def number_path(name: str) -> str:
@@ -225,7 +225,7 @@ def number_path(name: str) -> str:
         return paths[told]
     near = get_close_matches(name.lower(), known, n=1)
     hint = f"did you mean {known[near[0]]}?" if near else "e.g. front.suspension.stiffness."
-    raise ParameterError(f"No number of a vehicle is called {name!r}; {hint}")
+    raise ParameterError(f"No number of a vehicle is called '{name}'; {hint}")
 
 
 def default_bounds(name: str, start: float) -> tuple[float, float]:

@@ -24,6 +24,7 @@ from .csv_table import LARGEST_FILE, CsvTable
 from .errors import MeasurementError, RoadError
 from .formats.child import ChildTable
 from .formats.readers import HALF_TRACK, ROAD
+from .formats.table import Table
 from .road import Road
 from .units import UnitError, to_si
 
@@ -113,13 +114,18 @@ def _road(stream: BinaryIO, source: str) -> Road:
 
 def _crg(path: Path, half_track: float) -> Road:
     """The two wheel tracks of an OpenCRG road."""
-    source, options = path.name, {"left": half_track, "right": -half_track}
+    options = {"left": half_track, "right": -half_track}
     try:
-        with ChildTable(path, source, kind=ROAD, options=options) as table:
-            warnings = list(table.warnings)
-            x, left, right = (table.values(index) for index in range(3))
+        with ChildTable(path, path.name, kind=ROAD, options=options) as table:
+            return crg_road(table)
     except MeasurementError as error:
         raise RoadError(str(error)) from error
+
+
+def crg_road(table: Table) -> Road:
+    """The road in a table of `formats.crg`; RoadError and MeasurementError name the file."""
+    source, warnings = table.source, list(table.warnings)
+    x, left, right = (table.values(index) for index in range(3))
     if x.size < FEWEST_POINTS:
         raise RoadError(f"{source}: the road has {x.size} cross sections; export a longer one.")
     left, filled_left = _filled(x, left, "left", source)

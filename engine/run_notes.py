@@ -12,6 +12,7 @@ Other keys are for other readers, such as the vehicle that was driven.
 
 import math
 import re
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -119,9 +120,11 @@ def checked_noise(noise: Mapping[str, Any], source: str) -> dict[str, float]:
         except MeasurementError as error:
             raise MeasurementError(f"{source}: noise: {error}") from error
         number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not number or not 0.0 < value < math.inf:
+        if not number or not 0.0 < value <= sys.float_info.max:
+            plain = toml_value(value) if isinstance(value, int | float) else "no number"
+            shown = f"'{value}'" if isinstance(value, str) else plain
             raise MeasurementError(
-                f"{source}: noise of {name} is {value!r}; give a positive number in {info.unit}."
+                f"{source}: noise of {name} is {shown}; give a positive number in {info.unit}."
             )
     return {name: float(value) for name, value in noise.items()}
 

@@ -95,7 +95,9 @@ def sensors_from_json(data: Any, source: str = "sensors") -> SensorSet:
             try:
                 sensor.si_factor(one)
             except UnitError as error:
-                raise reader.refuse(f"sensors.{name}.unit", f"cannot be: {error}") from error
+                raise reader.refuse(
+                    f"sensors.{name}.unit", f"cannot be: {error}; correct it."
+                ) from error
             sensors[one] = sensor
     if not 0 < len(sensors) <= MOST_CHANNELS:
         raise reader.refuse("sensors", f"lists {len(sensors)} channels; give 1 to {MOST_CHANNELS}.")

@@ -101,7 +101,7 @@ def simulate_road(
     """
     if manoeuvre.kind != "road":
         raise SimulationError(
-            f"Manoeuvre {manoeuvre.name!r} moves the posts of a rig; simulate it in posts mode."
+            f"Manoeuvre '{manoeuvre.name}' moves the posts of a rig; simulate it in posts mode."
         )
     demand = manoeuvre.demand(vehicle, road)
     found = _free(
@@ -133,7 +133,7 @@ def simulate_posts(
         demand = motion.demand(vehicle)
     else:
         raise SimulationError(
-            f"Manoeuvre {motion.name!r} drives on a road; simulate it in road mode."
+            f"Manoeuvre '{motion.name}' drives on a road; simulate it in road mode."
         )
     return _free("posts", vehicle, motion.name, demand, model, lift_off, step, sample_step, points)
 

@@ -1,6 +1,7 @@
 """TOML: a file's text parsed at a cost that its size bounds, and values as text."""
 
 import json
+import re
 import tomllib
 from collections.abc import Mapping
 from typing import Any
@@ -15,6 +16,9 @@ MOST_DOTS = 200
 the tables goes as deep."""
 
 
+_KEYS = re.compile(r"\(['\"](.*)['\"],?\)")
+
+
 def parse_toml(data: bytes, source: str) -> dict[str, Any]:
     """Parse the bytes of a TOML file; `source` heads every message of a MeasurementError."""
     if len(data) > LARGEST_FILE:
@@ -27,8 +31,20 @@ def parse_toml(data: bytes, source: str) -> dict[str, Any]:
             )
     try:
         return tomllib.loads(data.decode("utf-8-sig").replace("\r\n", "\n"))
-    except (ValueError, RecursionError) as error:
-        raise MeasurementError(f"{source}: not valid TOML ({error}); correct it.") from error
+    except UnicodeDecodeError as error:
+        raise MeasurementError(
+            f"{source}: not UTF-8 text (byte {error.start + 1}); save it as TOML in UTF-8."
+        ) from error
+    except RecursionError as error:
+        raise MeasurementError(f"{source}: nested too deeply; correct the file.") from error
+    except ValueError as error:
+        raise MeasurementError(f"{source}: not valid TOML ({_told(error)}); correct it.") from error
+
+
+def _told(error: ValueError) -> str:
+    """What the standard library says, its keys and characters as a person writes them."""
+    said = _KEYS.sub(lambda keys: "[" + keys[1].replace("', '", ".") + "]", str(error))
+    return said.replace("\\x", "U+00")
 
 
 def toml_value(value: Any) -> str:

@@ -189,7 +189,7 @@ def brake_shares(vehicle: Vehicle, default: float | None) -> NDArray[np.float64]
     front = vehicle.brakes.front_share if vehicle.brakes is not None else default
     if front is None:
         raise ManoeuvreError(
-            f"The manoeuvre brakes, but the vehicle {vehicle.name!r} has no brakes; give the"
+            f"The manoeuvre brakes, but the vehicle '{vehicle.name}' has no brakes; give the"
             ' vehicle "brakes": {"front_share": 0.65} or the manoeuvre brake.front_share.'
         )
     return np.array([front, front, 1.0 - front, 1.0 - front]) / 2.0

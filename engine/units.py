@@ -120,7 +120,7 @@ def _converted(text: str, si_unit: str) -> tuple[float, float]:
             scale = si_one - si_zero
             return (one - zero) / scale, (zero - si_zero) / scale
     if known:
-        raise UnitError(f"the unit {text!r} does not measure the same quantity as {si_unit!r}")
+        raise UnitError(f"the unit '{text}' does not measure the same quantity as '{si_unit}'")
     raise _unknown(text)
 
 
@@ -171,7 +171,7 @@ def _factors(text: str) -> list[tuple[str, int]]:
 
 
 def _unknown(text: str) -> UnitError:
-    return UnitError(f"the unit {text[:LONGEST_TEXT]!r} is not known")
+    return UnitError(f"the unit '{text[:LONGEST_TEXT]}' is not known")
 
 
 @cache

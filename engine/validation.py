@@ -179,14 +179,14 @@ def _check_case(case: Case) -> None:
         return
     if case.manoeuvre.kind != "road":
         raise ManoeuvreError(
-            f"Run {run.name}: its manoeuvre, {case.manoeuvre.name!r}, moves the posts of a rig;"
+            f"Run {run.name}: its manoeuvre, '{case.manoeuvre.name}', moves the posts of a rig;"
             " give one on a road."
         )
     begin, end, duration = run.time[0], run.time[-1], case.manoeuvre.duration
     if begin < 0.0 or end > duration + 1e-6:
         raise ManoeuvreError(
             f"Run {run.name} lasts from {begin:g} to {end:g} s, its manoeuvre,"
-            f" {case.manoeuvre.name!r}, from 0 to {duration:g} s; count the run's time from the"
+            f" '{case.manoeuvre.name}', from 0 to {duration:g} s; count the run's time from the"
             " manoeuvre's beginning and cut what is beyond it."
         )
 

@@ -292,10 +292,10 @@ def _require_number(vehicle: Vehicle, path: str) -> None:
     if path not in numbers():
         near = get_close_matches(path, numbers(), n=1)
         hint = f"did you mean {near[0]}?" if near else "e.g. front.suspension.stiffness."
-        raise ParameterError(f"No number of a vehicle is called {path!r}; {hint}")
+        raise ParameterError(f"No number of a vehicle is called '{path}'; {hint}")
     if path.startswith("brakes.") and vehicle.brakes is None:
         raise ParameterError(
-            f"{path} cannot be used because the vehicle {vehicle.name!r} has no brakes;"
+            f"{path} cannot be used because the vehicle '{vehicle.name}' has no brakes;"
             ' add "brakes" to its data first.'
         )
 

@@ -80,7 +80,10 @@ def tdms(path: Path) -> None:
 
 
 def uff(path: Path, binary: bool = False, even: bool = True) -> None:
-    file = pyuff.UFF(str(path))
+    uff_sets(pyuff.UFF(str(path)), binary, even)
+
+
+def uff_sets(file: pyuff.UFF, binary: bool, even: bool) -> None:
     for name, (values, unit) in CHANNELS.items():
         write_set(
             file,

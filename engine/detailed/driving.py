@@ -59,7 +59,7 @@ class DetailedRunDiverged(SimulationDiverged):
     def __init__(self, time: float, body: str, partial: Run | None):
         super().__init__(
             time,
-            f"body {body!r}",
+            f"body '{body}'",
             "take a shorter step, or check the car's points and stiffnesses.",
         )
         self.partial = partial
@@ -85,7 +85,7 @@ def drive(
     every = _samples_every(step, sample_step)
     if manoeuvre.kind != "road":
         raise SimulationError(
-            f"Manoeuvre {manoeuvre.name!r} is one of a rig, on which the detailed car cannot"
+            f"Manoeuvre '{manoeuvre.name}' is one of a rig, on which the detailed car cannot"
             ' stand; choose one of kind "road".'
         )
     demand = manoeuvre.demand(point_mass(car))

@@ -30,12 +30,12 @@ def settle(model: Model) -> Array:
     except model.exudyn.ExudynError as error:
         raise SimulationError(
             f"The car finds no position of rest: the static solution fails, farthest off"
-            f" {_farthest(model)[0]!r}; check the points and stiffnesses of what holds it."
+            f" '{_farthest(model)[0]}'; check the points and stiffnesses of what holds it."
         ) from error
     body, distance = _farthest(model)
     if not distance < FARTHEST:
         raise SimulationError(
-            f"At rest {body!r} lies {distance:.2f} m from its design position; check the points"
+            f"At rest '{body}' lies {distance:.2f} m from its design position; check the points"
             " and stiffnesses of what holds it, and the preloads."
         )
     model.hold(False)

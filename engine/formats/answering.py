@@ -8,6 +8,7 @@ from typing import Any
 from ..errors import RideError, UnmappedError
 from .envelope import envelope
 from .kinds import kind_of
+from .listing import SPENT
 from .readers import read_as
 from .table import Array, Table
 
@@ -41,25 +42,24 @@ class Answering:
         except RideError as error:
             return {"error": str(error), "unmapped": isinstance(error, UnmappedError)}, ()
         except MemoryError:
-            return self._error(
-                f"reading it takes more than {self._memory / 2**30:.3g} GB of memory; cut the"
-                " recording or export fewer channels"
-            )
+            return self._out_of_memory()
         except ImportError as error:
             return self._error(
                 f"{error.name or 'a package'} cannot be loaded; install ridetune[formats] again"
             )
         except Exception as error:  # the readers raise whatever a spoilt file drives them to
             if "allocate" in str(error).lower():
-                return self._error(
-                    f"reading it takes more than {self._memory / 2**30:.3g} GB of memory; cut the"
-                    " recording or export fewer channels"
-                )
+                return self._out_of_memory()
             kind = f" as {self._kind}" if self._kind else ""
             return self._error(
                 f"the file cannot be read{kind} ({type(error).__name__}); it is damaged, cut short"
                 " or written in an unusual way, so export it again"
             )
+
+    def _out_of_memory(self) -> Answer:
+        return self._error(
+            f"reading it takes more than {self._memory / 2**30:.3g} GB of memory{SPENT}"
+        )
 
     def _error(self, what: str) -> Answer:
         return {"error": f"{self._source}: {what}."}, ()

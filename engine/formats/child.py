@@ -26,7 +26,7 @@ import numpy as np
 from ..errors import MeasurementError, UnmappedError
 from . import wire
 from .envelope import Envelope
-from .listing import MOST_COLUMNS, MOST_SAMPLES, plain
+from .listing import MOST_COLUMNS, MOST_SAMPLES, SPENT, plain
 from .table import Array, Column, Table
 
 LONGEST_SENTENCE = 2000
@@ -171,8 +171,7 @@ class ChildTable(Table):
         except wire.TooSlow as error:
             self._kill()
             raise self._refused(
-                f"reading it took more than {self._bounds.wall:g} s; cut the recording or export"
-                " fewer channels"
+                f"reading it took more than {self._bounds.wall:g} s{SPENT}"
             ) from error
         except wire.Garbled as error:
             self._kill()
@@ -193,10 +192,7 @@ class ChildTable(Table):
             self._kill()
             code = self._process.wait()
         if code == -signal.SIGXCPU:
-            return (
-                f"reading it took more than {self._bounds.cpu} s of processor time; cut the"
-                " recording or export fewer channels"
-            )
+            return f"reading it took more than {self._bounds.cpu} s of processor time{SPENT}"
         if code == -signal.SIGKILL:
             return "its reader was killed, probably for want of memory; cut the recording"
         name = signal.Signals(-code).name if code < 0 else f"exit status {code}"

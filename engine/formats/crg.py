@@ -6,6 +6,7 @@ line: where the line turns, climbs or banks is not taken, as the car is driven s
 and a sentence says so. NaN is what a scan lacks.
 """
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,13 +14,14 @@ from typing import Any
 import numpy as np
 
 from ..errors import MeasurementError
-from .listing import MOST_SAMPLES
+from .listing import MOST_SAMPLES, plain
 from .table import Array, Column, Table
 
 LARGEST = 1_000_000_000
 """Longest OpenCRG file, bytes."""
 
 _DAMAGE = ("multiple of", "not correctly padded", "truncated")
+_SHORT = re.compile(r"gives (\d+) cross sections but the file has (\d+)")
 
 
 class CrgFile(Table):
@@ -27,6 +29,7 @@ class CrgFile(Table):
 
     def __init__(self, path: Path, source: str, kind: str, options: Mapping[str, float]):
         import pyopencrg
+        from pyopencrg.io import CrgFormatError
 
         self.source, self.kind, self.comment = source, kind, ""
         with path.open("rb") as stream:
@@ -42,8 +45,14 @@ class CrgFile(Table):
             )
         try:
             road = pyopencrg.read(str(path))
-        except pyopencrg.CrgCheckError as error:
-            raise self._refused(str(error)) from error
+        except (pyopencrg.CrgCheckError, CrgFormatError) as error:
+            raise self._refused(str(error).removeprefix(f"{path}: ")) from error
+        for said in road.read_warnings:
+            if (found := _SHORT.search(said)) and int(found[2]) < int(found[1]):
+                raise MeasurementError(
+                    f"{source}: the file holds {found[2]} of the {found[1]} cross sections that it"
+                    " declares; it is cut short, so transfer it again."
+                )
         left, right = options["left"], options["right"]
         if not road.v_min <= right < left <= road.v_max:
             raise MeasurementError(
@@ -69,9 +78,9 @@ class CrgFile(Table):
                 " binary mode."
             )
         first = next((line for line in said.splitlines()[1:] if line.strip()), said)
+        shown = plain(first.strip(" -").removeprefix("(reading) ").partition(" (use one")[0])[:150]
         return MeasurementError(
-            f"{self.source}: this is no sound OpenCRG road ({first.strip(' -')[:150]}); export it"
-            " again."
+            f"{self.source}: this is no sound OpenCRG road: {shown}; export it again."
         )
 
     def values(self, index: int) -> Array:

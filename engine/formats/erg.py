@@ -15,7 +15,14 @@ import numpy as np
 
 from ..errors import MeasurementError
 from .kinds import ERG_ZIP, erg_pair
-from .listing import MOST_SAMPLES, Listing, first_text, plain
+from .listing import (
+    CONVERTED,
+    MOST_SAMPLES,
+    Listing,
+    first_text,
+    line_ends_converted,
+    plain,
+)
 from .table import Array, Column, Table
 
 HEAD_BYTES = 16
@@ -53,7 +60,8 @@ class ErgFile(Table):
         order = ">" if stated.get("File.ByteOrder", "").lower().startswith("big") else "<"
         fields, factors, units = self._fields(stated, order)
         record = np.dtype(fields)
-        samples = (size - HEAD_BYTES) // max(record.itemsize, 1)
+        width = max(record.itemsize, 1)
+        samples, rest = divmod(size - HEAD_BYTES, width)
         if samples > MOST_SAMPLES:
             raise MeasurementError(
                 f"{source}: its records of {record.itemsize} bytes make {samples} samples, more"
@@ -71,6 +79,9 @@ class ErgFile(Table):
                 f"{source}: its records are {said} bytes long but described as {record.itemsize};"
                 " give the .erg.info that was written with it."
             )
+        added = line_ends_converted(data[HEAD_BYTES:])
+        if added and (added - rest) % width == 0:
+            raise MeasurementError(f"{source}: {CONVERTED}.")
         self._records = data[HEAD_BYTES : HEAD_BYTES + samples * record.itemsize].view(record)
         listing = Listing(source, self.kind)
         found = []
@@ -83,6 +94,10 @@ class ErgFile(Table):
                 listing.leave_out(name, "holds no plain numbers")
         listing.add_timed(found)
         self.columns, self.warnings = listing.columns(), listing.warnings()
+        if rest:
+            self.warnings += (
+                "The file ends within a record; it was cut short or changed in transfer.",
+            )
         self._places = listing.places
 
     def _beside(self, path: Path) -> tuple[int, bytes]:
@@ -131,10 +146,10 @@ class ErgFile(Table):
             gap = _BYTES.fullmatch(said)
             form = f"S{gap[1]}" if gap else _TYPES.get(said)
             if form is None or name in factors:
+                what = "there twice" if form else f"of the unknown type '{plain(said)}'"
                 raise MeasurementError(
                     f"{self.source}: quantity {number} of its description, {plain(name)}, is"
-                    f" {'there twice' if form else f'of the unknown type {plain(said)!r}'}; give"
-                    " the .erg.info that was written with it."
+                    f" {what}; give the .erg.info that was written with it."
                 )
             # Bytes that only fill up a record have a name of dollar signs or none.
             key = f"\0{number}" if gap and name.strip("$ ") in ("", "none") else name
@@ -160,7 +175,7 @@ class ErgFile(Table):
         except ValueError as error:
             raise MeasurementError(
                 f"{self.source}: Quantity.{plain(name)}.{key} of its description is"
-                f" {plain(text)!r}; write a number."
+                f" '{plain(text)}'; write a number."
             ) from error
 
     def values(self, index: int) -> Array:

@@ -26,6 +26,9 @@ DEEPEST = 20
 MOST_OBJECTS = 100_000
 """Most groups and data sets that are looked at."""
 
+DAMAGE = (OSError, RuntimeError, KeyError, TypeError, ValueError)
+"""What h5py raises at a part of a file that cannot be read."""
+
 _UNITS = ("unit", "units", "Unit", "Units", "UNIT", "unit_string")
 _BOOKKEEPING = ("#refs#", "#subsystem#")
 
@@ -62,11 +65,14 @@ class Hdf5File(Table):
             if not isinstance(group.get(name, getlink=True), self._h5py.HardLink):
                 self._listing.leave_out(shown, "is a link, which is not followed")
                 continue
-            item = group[name]
-            if isinstance(item, self._h5py.Group):
-                self._walk(item, here)
-            elif isinstance(item, self._h5py.Dataset):
-                self._take(item, here)
+            try:
+                item = group[name]
+                if isinstance(item, self._h5py.Group):
+                    self._walk(item, here)
+                elif isinstance(item, self._h5py.Dataset):
+                    self._take(item, here)
+            except DAMAGE:
+                self._listing.leave_out(shown, "is damaged or of an unusual type")
 
     def _take(self, data: Any, path: tuple[str, ...]) -> None:
         name, why = self._name(path), self._unreadable(data)

@@ -16,16 +16,31 @@ MOST_COLUMNS = 50_000
 MOST_SAMPLES = MOST_NUMBERS
 """Most samples of one column."""
 
+LONGEST_STEP, LATEST = 1e6, 1e12
+"""Longest time between two samples, and first time, that are believed, s."""
+
 WIDEST = 64
 """Most columns one array of two dimensions is taken for."""
 
 LONGEST_TEXT = 200
 """Longest name, unit or comment that is kept, characters."""
 
+CONVERTED = (
+    "its numbers are damaged by a conversion of line ends, as a transfer of text does; transfer it"
+    " again in binary mode"
+)
+"""The sentence behind a file's name."""
+
+SPENT = ", as a damaged file may; export it again, shorter or with fewer channels"
+"""What to do where reading takes too much time or memory."""
+
 _TIME = re.compile(
     r"(time|t|zeit|uhrzeit|temps|timestamps?|time_?s(ec)?|abtastzeit)", re.IGNORECASE
 )
 _SHOWN = 5
+_PIECE = 1 << 20
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]+")
+"""Control characters, ends of lines, turns of the direction of writing, halves of characters."""
 
 
 class Listing:
@@ -43,11 +58,9 @@ class Listing:
             raise MeasurementError(
                 f"{self._source}: the file has more than {MOST_COLUMNS} columns; export fewer."
             )
-        if column.samples <= 0:
-            return self.leave_out(column.name, "holds no samples")
-        if column.samples > MOST_SAMPLES:
-            return self.leave_out(column.name, f"declares more than {MOST_SAMPLES} samples")
-        self._columns.append(column)
+        if not self._takes(column):
+            return None
+        self._columns.append(_timed(column))
         self.places.append(place)
         return len(self._columns) - 1
 
@@ -56,10 +69,19 @@ class Listing:
 
         found : path of groups and name, column, and where its numbers are
         """
-        found = list(found)
-        clocks = nearest_clocks([(path, column.samples) for path, column, _ in found])
-        for (_, column, place), clock in zip(found, clocks, strict=True):
+        # What is left out is no column, and would shift the times of those behind it.
+        taken = [(path, _timed(one), place) for path, one, place in found if self._takes(one)]
+        clocks = nearest_clocks([(path, column.samples) for path, column, _ in taken])
+        for (_, column, place), clock in zip(taken, clocks, strict=True):
             self.add(replace(column, clock=clock if column.step is None else None), place)
+
+    def _takes(self, column: Column) -> bool:
+        """Whether a column has as many samples as are read; it is left out where it has not."""
+        if column.samples <= 0:
+            self.leave_out(column.name, "holds no samples")
+        elif column.samples > MOST_SAMPLES:
+            self.leave_out(column.name, f"declares more than {MOST_SAMPLES} samples")
+        return 0 < column.samples <= MOST_SAMPLES
 
     def leave_out(self, name: str, why: str) -> None:
         """Note what is not taken for a column, and why."""
@@ -83,6 +105,14 @@ class Listing:
         return [f"{_named(names)} {why}" for why, names in self._left.items()]
 
 
+def _timed(column: Column) -> Column:
+    """A column whose step is one, or that tells none."""
+    step = column.step
+    if step is None or (0.0 < step < LONGEST_STEP and abs(column.start) < LATEST):
+        return column
+    return replace(column, start=0.0, step=None)
+
+
 def _named(names: Sequence[str]) -> str:
     shown = ", ".join(name or "a column without a name" for name in names[:_SHOWN])
     return shown + (f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else "")
@@ -93,7 +123,7 @@ def plain(text: Any) -> str:
     if isinstance(text, bytes):
         text = text[: 4 * LONGEST_TEXT].decode("utf-8", "replace")
     kept = str(text)[: 4 * LONGEST_TEXT]
-    kept = re.sub(r"[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]+", " ", kept)
+    kept = _CONTROL.sub(" ", kept)
     return kept.strip()[:LONGEST_TEXT]
 
 
@@ -137,6 +167,21 @@ def earliest(dates: Iterable[Any]) -> Any:
     """The earliest of some datetime64, NaT where there is none."""
     known = [one for one in dates if not np.isnat(one)]
     return min(known) if known else np.datetime64("NaT")
+
+
+def line_ends_converted(data: Any) -> int:
+    """How many bytes a conversion of line ends has put in, where it looks like one; else 0.
+
+    data : bytes of numbers, of which a few line feeds would follow other than a carriage return
+    """
+    added, last = 0, b""
+    for begin in range(0, len(data), _PIECE):
+        piece = last + data[begin : begin + _PIECE].tobytes()
+        feeds = piece.count(b"\n") - last.count(b"\n")
+        if feeds != piece.count(b"\r\n"):
+            return 0
+        added, last = added + feeds, piece[-1:]
+    return added
 
 
 def first_text(*texts: Any) -> str:

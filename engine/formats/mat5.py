@@ -93,7 +93,9 @@ class Mat5File(Table):
 
         kept = loadmat(str(self._path), variable_names=[name], struct_as_record=True)
         if name not in kept:
-            raise MeasurementError(f"{self.source}: {plain(name)} cannot be read; save it again.")
+            raise MeasurementError(
+                f"{self.source}: {plain(name) or 'a variable'} cannot be read; save it again."
+            )
         return kept[name]
 
     def _array(

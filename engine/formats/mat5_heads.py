@@ -42,6 +42,9 @@ def heads(stream: BinaryIO) -> Iterator[Head]:
     while True:
         tag = stream.read(8)
         if len(tag) < 8:
+            # A conversion of line ends moves the last numbers behind the end of their variable.
+            if tag.strip(b"\0"):
+                raise ValueError("bytes behind the last variable")
             return
         kind, length = struct.unpack(f"{order}II", tag)
         start = stream.tell()

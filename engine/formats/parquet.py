@@ -30,30 +30,27 @@ class ParquetTable(Table):
             thrift_container_size_limit=1_000_000,
         )
         samples, listing = int(self._file.metadata.num_rows), Listing(source, kind)
-        fields = {field.name: field for field in self._file.schema_arrow}
         found: list[tuple[tuple[str, ...], Column, int]] = []
         begins = []
-        for leaf in range(self._file.metadata.num_columns):
-            described = self._file.schema.column(leaf)
-            field = fields.get(described.path)
-            if field is None or not _is_number(pa, field.type):
-                listing.leave_out(described.path, "holds no plain numbers")
+        for place, field in enumerate(self._file.schema_arrow):
+            if not _is_number(pa, field.type):
+                listing.leave_out(field.name, "holds no plain numbers")
                 continue
             name, unit = split_title(plain(field.name))
             stated = field.metadata or {}
             unit = first_text(stated.get(b"unit"), stated.get(b"units"), unit)
             if samples and pa.types.is_timestamp(field.type):
-                first = next(self._file.iter_batches(batch_size=1, columns=[described.path]))
+                first = next(self._file.iter_batches(batch_size=1, columns=[field.name]))
                 begins.append(first.column(0).to_numpy(zero_copy_only=False)[0])
             unit = "s" if pa.types.is_temporal(field.type) else unit
-            found.append(((name,), Column(name, unit, samples), leaf))
+            found.append(((name,), Column(name, unit, samples), place))
         listing.add_timed(found)
         self.columns, self.warnings = listing.columns(), listing.warnings()
-        self._leaves, self._since = listing.places, earliest(begins)
+        self._places, self._since = listing.places, earliest(begins)
 
     def values(self, index: int) -> Array:
         """The numbers of one column; NaN for what is null."""
-        column = self._file.reader.read_column(self._leaves[index])
+        column = self._file.reader.read_column(self._places[index])
         if self._pa.types.is_decimal(column.type):
             column = column.cast(self._pa.float64())
         chunks = [chunk.to_numpy(zero_copy_only=False) for chunk in column.chunks]

@@ -3,12 +3,14 @@
 After the header lie groups of PTS_PER_GROUP samples, within each one channel after the other.
 """
 
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .listing import Listing, first_text, plain
+from ..errors import MeasurementError
+from .listing import CONVERTED, Listing, first_text, line_ends_converted, plain
 from .table import Array, Column, Table
 
 
@@ -19,7 +21,14 @@ class RpcFile(Table):
         import rpc3
 
         self.source, self.kind, self.comment = source, kind, ""
-        listed: Any = rpc3.read(str(path), header_only=True)
+        try:
+            listed: Any = rpc3.read(str(path), header_only=True)
+        except rpc3.FileFormatError as error:
+            # What stands in place of a number says nothing.
+            said = re.sub(r"(Format error for `\w+`)=.*", r"\1", plain(error)).rstrip(".")
+            raise MeasurementError(
+                f"{source}: this is no sound RPC III file: {said}; export it again."
+            ) from error
         channels, facts = listed
         frame, group = int(facts["PTS_PER_FRAME"]), int(facts["PTS_PER_GROUP"])
         whole = facts.get("DATA_TYPE", "SHORT_INTEGER") == "SHORT_INTEGER"
@@ -35,11 +44,15 @@ class RpcFile(Table):
             listing.add(column, (number, float(channel.resolution) if whole else 1.0))
         self.columns, self.warnings = listing.columns(), listing.warnings()
         self._places = listing.places
-        file = np.memmap(
-            path, np.dtype("<i2" if whole else "<f4"), "r", 512 * int(facts["NUM_HEADER_BLOCKS"])
-        )
+        form = np.dtype("<i2" if whole else "<f4")
         groups = -(-int(facts["FRAMES"]) * frame // group)
-        self._data = file[: groups * len(channels) * group].reshape(groups, len(channels), group)
+        head, declared = 512 * int(facts["NUM_HEADER_BLOCKS"]), groups * len(channels) * group
+        file = np.memmap(path, np.uint8, "r")
+        end = head + declared * form.itemsize
+        surplus = len(file) - end
+        if surplus and surplus == line_ends_converted(file):
+            raise MeasurementError(f"{source}: {CONVERTED}.")
+        self._data = file[head:end].view(form).reshape(groups, len(channels), group)
 
     def values(self, index: int) -> Array:
         """The numbers of one channel, scaled."""

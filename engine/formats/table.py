@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..csv_table import LARGEST_NUMBER
 from ..errors import MeasurementError, UnmappedError
 
 Array = NDArray[np.float64]
@@ -88,7 +89,7 @@ class Table(ABC):
             values = self.values(index)
             with np.errstate(over="ignore", invalid="ignore"):
                 numbers[:, place] = factor * values + offset
-            finite = np.isfinite(numbers[:, place])
+            finite = np.abs(numbers[:, place]) < LARGEST_NUMBER
             if not finite.all():
                 raise self._not_finite(index, values, int(np.argmin(finite)))
         return numbers

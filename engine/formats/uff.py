@@ -14,11 +14,14 @@ from typing import Any
 
 from ..errors import MeasurementError
 from ..units import UnitError, to_si
-from .listing import Listing, first_text, numbers, plain
+from .listing import CONVERTED, Listing, first_text, numbers, plain
 from .table import Array, Column, Table
 
 LARGEST = 400_000_000
 """Longest UFF file, bytes; it is searched as a whole."""
+
+HEAD_LINES = 13
+"""Lines of a data set before its numbers, two of which begin it."""
 
 _TIME, _FREQUENCY = 17, 18
 _SPECTRA = frozenset((2, 3, 4, 6, 9, 10, 12, 13))
@@ -54,6 +57,7 @@ class UffFile(Table):
                 " in parts."
             )
         self._file: Any = pyuff.UFF(str(path))
+        self._path = path
         self._held: tuple[int, Any] = (-1, None)
         listing = Listing(source, kind)
         self._said: list[str] = []
@@ -139,7 +143,7 @@ class UffFile(Table):
         """The ordinate of one data set, or its abscissa."""
         k, part, factor = self._places[index]
         if self._held[0] != k:
-            self._held = (k, self._file.read_sets(k))
+            self._held = (k, self._read(k))
         values, declared = numbers(self._held[1][part]), self.columns[index].samples
         if len(values) < declared:
             raise MeasurementError(
@@ -147,6 +151,21 @@ class UffFile(Table):
                 f" declares {declared}; it is cut short, so export it again."
             )
         return factor * values[:declared]
+
+    def _read(self, k: int) -> Any:
+        """A data set; of a binary one, nothing but a line end may stand behind the numbers."""
+        held = self._file.read_sets(k)
+        if held["binary"]:
+            # The number of bytes in the head does not count the abscissa with some programs.
+            size = (4 if held["ord_data_type"] == 2 else 8) * (1 + (held["abscissa_spacing"] != 1))
+            declared = size * int(held["num_pts"])
+            begin, end = self._file._block_ind[k]
+            with self._path.open("rb") as stream:
+                stream.seek(begin)
+                lines = stream.read(end - begin + 1).splitlines(keepends=True)
+            if b"".join(lines[HEAD_LINES:])[declared:].strip(b"\r\n\0 "):
+                raise MeasurementError(f"{self.source}: data set {k + 1}: {CONVERTED}.")
+        return held
 
 
 def _is_cut(path: Path) -> bool:

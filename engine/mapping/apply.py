@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..channels import Run, channel
 from ..clocks import ROUNDING, Clocks, Series, clock_key, even_time, joined, way_of_time
+from ..csv_table import LARGEST_NUMBER
 from ..errors import MeasurementError
 from ..formats.table import Column, Table
 from ..plausibility import (
@@ -75,11 +76,11 @@ def _found(mapping: ChannelMapping, table: Table) -> dict[str, tuple[MappedColum
     for entry in mapping.columns:
         where = places.of(entry.column, entry.group)
         if len(where) != 1:
-            group = f" in the group {entry.group!r}" if entry.group else ""
+            group = f" in the group '{entry.group}'" if entry.group else ""
             what = f"has {len(where)} columns" if where else "has no column"
             remedy = "name its group" if where else "map another one"
             raise MeasurementError(
-                f"{table.source}: the file {what} called {entry.column!r}{group}, which the"
+                f"{table.source}: the file {what} called '{entry.column}'{group}, which the"
                 f" mapping takes for {entry.channel}; {remedy}."
             )
         other = taken.setdefault(where[0], entry)
@@ -140,13 +141,15 @@ class _Times:
     def _mapped(self) -> Array:
         assert self._entry is not None
         factor, offset = self._entry.to_si()
-        return factor * self._table.values(self._index) + offset
+        with np.errstate(over="ignore", invalid="ignore"):
+            return factor * self._table.values(self._index) + offset
 
     def _own(self, column: Column) -> Array:
         if column.clock is None:
             return even_time(column)
         index, factor, offset = way_of_time(self._table, column.clock)
-        return factor * self._table.values(index) + offset
+        with np.errstate(over="ignore", invalid="ignore"):
+            return factor * self._table.values(index) + offset
 
 
 def _series(
@@ -172,7 +175,7 @@ def _series(
     factor, offset = entry.to_si()
     with np.errstate(over="ignore", invalid="ignore"):
         numbers = factor * values[measured] + offset
-    if not np.isfinite(numbers).all():
+    if not np.all(np.abs(numbers) < LARGEST_NUMBER):
         raise MeasurementError(f"{place} holds a number too large for its unit; correct it.")
     if numbers.min() == numbers.max():
         warnings.append(f"{entry.column}, mapped as {entry.channel}, never changes.")

@@ -199,7 +199,7 @@ def _candidate(
         confidence, reason = NEVER_CHANGES * confidence, f"{reason}; it never changes"
     sign, words = stated_sign(info.name, column.comment, column.name)
     if sign < 0:
-        reason = f"{reason}; turned over, since it says {words!r}"
+        reason = f"{reason}; turned over, since it says '{words}'"
     elif known is not None and _hangs(info, unit.unit, known):
         sign, reason = -1, f"{reason}; turned over, since it reads gravity as {known.median:.4g}"
     return Candidate(info.name, unit.unit, sign, round(confidence, 3), reason, unit.doubted)

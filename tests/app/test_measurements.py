@@ -175,7 +175,7 @@ BAD_FILES = {
     "binary": (bytes(range(256)) * 40, "text"),
     "no header": (b"0,1,2\n0.1,1,2\n0.2,1,2\n", "header"),
     "two samples": (b"time [s],chassis.z [m]\n0,0\n0.01,0\n", "2 samples"),
-    "a header alone": (b"Zeit [s],Aufbau z [mm]\n", "no table of numbers"),
+    "a header alone": (b"Zeit [s],Aufbau z [mm]\n", "no samples stand below the header"),
     "two samples of others": (b"Zeit [s],Aufbau z [mm]\n0,0\n0.01,1\n", "2 samples"),
     "unknown unit": (short_recording().replace(b"[mm]", b"[parsec2]", 1), "parsec2"),
     "doubled channel": (short_recording().replace(b"wheel.fr", b"wheel.fl"), "wheel.fl.z"),

@@ -96,6 +96,24 @@ def test_converted_line_ends_are_recognized(tmp_path):
     assert "a conversion of its line ends" in refusal(tmp_path / "r.crg")
 
 
+@pytest.mark.filterwarnings("ignore::pyopencrg.CrgCheckWarning")
+def test_a_text_cut_short_is_refused_with_what_is_left(tmp_path):
+    """Oracle: the cross sections written, and the lines kept; 13 heights take two lines."""
+    written(tmp_path / "r.crg", form="LRFI")
+    head, mark, rows = (tmp_path / "r.crg").read_bytes().rpartition(b"$" * 72 + b"\n")
+    kept = b"".join(rows.splitlines(keepends=True)[: 2 * 50])
+    (tmp_path / "r.crg").write_bytes(head + mark + kept)
+    assert "holds 50 of the 121 cross sections that it declares" in refusal(tmp_path / "r.crg")
+
+
+def test_a_road_without_its_definitions_is_refused_by_what_it_lacks(tmp_path):
+    written(tmp_path / "r.crg", form="LRFI")
+    data = (tmp_path / "r.crg").read_bytes().replace(b"$KD_DEFINITION", b"$OTHER")
+    (tmp_path / "r.crg").write_bytes(data)
+    said = refusal(tmp_path / "r.crg")
+    assert said.startswith("r.crg: this is no sound OpenCRG road: no $KD_DEFINITION block found")
+
+
 def test_a_reference_to_another_file_is_not_followed(tmp_path):
     text = "$CT\ncomment\n$!****\n$ROAD_CRG_FILE\n$HOME/secret.crg\n$!****\n"
     (tmp_path / "r.crg").write_text(text)

@@ -61,6 +61,7 @@ def test_a_union_takes_each_of_its_types(given, read_as):
         ({"kind": "disk", "radius": 1}, r'shape\.kind "disk" is not known; did you mean "disc"\?'),
         ({"radius": 1}, r"shape\.kind is missing; use \"disc\" or \"box\""),
         ({"kind": "disc", "raduis": 1}, r'shape\.raduis is not known; did you mean "radius"\?'),
+        ({"kind": "disc", " ": 1}, r'shape\."" is not known; use "radius" or "kind"'),
         ({"kind": "disc", "zz": 1}, r"shape\.zz is not known; use \"radius\" or \"kind\""),
         ({"kind": "disc"}, r"shape\.radius is missing; add a number between 0 and 10 m"),
         ({"kind": "disc", "radius": 11}, r"shape\.radius is 11, but must lie between 0 and 10 m"),

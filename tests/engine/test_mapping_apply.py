@@ -343,6 +343,14 @@ def test_a_template_made_of_one_file_reads_the_next():
             },
             "m.json: column a is both chassis.z and chassis.x; keep one of them.",
         ),
+        (
+            {
+                "columns": [
+                    {"column": "a", "channel": "chassis.z", "unit": "m", "missing": [-64.1e308]}
+                ]
+            },
+            "m.json: columns[0].missing[0] is -inf, but must be finite; correct it.",
+        ),
         ({"columns": [], "longest_gap": -1}, "m.json: longest_gap is -1, but must lie between"),
         (
             {"columns": [{"column": "a", "channel": "chassis.z", "unit": "m"}] * 1001},
