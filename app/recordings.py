@@ -22,6 +22,7 @@ from ..engine.errors import MeasurementError, UnmappedError
 from ..engine.remembered import Remembered
 from ..engine.rims_settings import RimsSettings
 from ..engine.run_notes import doubtful_noise
+from ..engine.step_record import step_records_from_json
 from .store import Measurement, NewMeasurement, Store
 
 if TYPE_CHECKING:
@@ -77,8 +78,12 @@ class Recordings:
                 f"{measurement.name}: its columns are not mapped to channels; map them first."
             )
         run = self._runs.made(_key(measurement), lambda: self.parse(measurement), _size)
+        done = run.conditioning
+        if measurement.conditioned is not None:
+            done = step_records_from_json(measurement.conditioned, measurement.name)
         return replace(
             run,
+            conditioning=done,
             noise=measurement.noise,
             warnings=(*run.warnings, *doubtful_noise(measurement.noise, run.channels)),
         )
@@ -232,11 +237,9 @@ def _key(measurement: Measurement) -> tuple[str, str, str]:
 
 def _done_to(measurement: Measurement) -> tuple[Any, ...]:
     """What stands for a measurement's file and what is done to it."""
-    done = ()
-    if measurement.conditioning is not None:
-        text = json.dumps(measurement.conditioning, sort_keys=True)
-        done = (text, *sorted(measurement.noise.items()))
-    return *_key(measurement), *done
+    done = json.dumps([measurement.conditioned, measurement.conditioning], sort_keys=True)
+    noise = () if measurement.conditioning is None else sorted(measurement.noise.items())
+    return *_key(measurement), done, *noise
 
 
 def stated(measurement: Measurement) -> dict[str, Any]:
@@ -247,6 +250,7 @@ def stated(measurement: Measurement) -> dict[str, Any]:
         "noise": measurement.noise,
         "mapping": measurement.mapping,
         "conditioning": measurement.conditioning,
+        "conditioned": measurement.conditioned,
     }
 
 
@@ -258,6 +262,7 @@ def as_stated(measurement: Measurement, kept: Mapping[str, Any]) -> Measurement:
         noise=kept.get("noise", measurement.noise),
         mapping=kept.get("mapping"),
         conditioning=kept.get("conditioning"),
+        conditioned=kept.get("conditioned"),
     )
 
 

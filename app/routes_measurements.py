@@ -12,6 +12,7 @@ from ..engine.channels import OUTPUT_CHANNELS
 from ..engine.errors import ManoeuvreError, MeasurementError
 from ..engine.json_text import parse_json
 from ..engine.run_notes import parse_notes
+from ..engine.step_record import step_record_to_json
 from . import frames
 from .access import SessionId
 from .recordings import summary
@@ -42,6 +43,7 @@ def measurement_to_json(kept: Measurement) -> dict[str, Any]:
         "noise": kept.noise,
         "manoeuvre": kept.manoeuvre,
         "conditioning": kept.conditioning and kept.conditioning["steps"],
+        "conditioned": kept.conditioned,
         "mapping": kept.mapping,
         "needs_mapping": False,
         "sign_suggestions": [],
@@ -122,7 +124,7 @@ def original(sid: SessionId, mid: str, services: Shared) -> FileResponse:
 
 @router.put("/{mid}/notes", openapi_extra=openapi("application/toml"))
 async def set_notes(sid: SessionId, mid: str, services: Shared, received: Notes) -> dict[str, Any]:
-    """Take a recording's noise from a NAME.toml, as the file beside it would state it."""
+    """Take a recording's noise, and what was done to it, from a NAME.toml as it lies beside it."""
     noted = await services.readers.run(sid, lambda: _note(services, sid, mid, received))
     return measurement_to_json(noted)
 
@@ -130,17 +132,19 @@ async def set_notes(sid: SessionId, mid: str, services: Shared, received: Notes)
 def _note(services: Services, sid: str, mid: str, received: Upload) -> Measurement:
     kept = services.store.measurement(sid, mid)
     data = received.read(services.settings.limits.body_bytes)
-    noise = dict(parse_notes(data, received.name).noise)
-    if not noise.keys() & set(OUTPUT_CHANNELS):
+    notes = parse_notes(data, received.name)
+    noise, done = dict(notes.noise), [step_record_to_json(one) for one in notes.conditioning]
+    if not done and not noise.keys() & set(OUTPUT_CHANNELS):
         raise MeasurementError(
             f"{received.name} states no noise of {', '.join(OUTPUT_CHANNELS)}; write [noise] and "
             'below it lines such as "chassis.z" = 0.0005, in SI.'
         )
     if kept.summary.get("needs_mapping"):
-        return services.store.set_noise(sid, kept.id, noise, kept.summary)
+        return services.store.set_notes(sid, kept.id, noise, done, kept.summary)
     known = dict(services.recordings.parse(kept, noise).noise)
-    found = summary(services.recordings.run(replace(kept, noise=known)), kept.mapping)
-    return services.store.set_noise(sid, kept.id, known, found)
+    noted = replace(kept, noise=known, conditioned=done or None)
+    found = summary(services.recordings.run(noted), kept.mapping)
+    return services.store.set_notes(sid, kept.id, known, done, found)
 
 
 @router.put("/{mid}/manoeuvre", openapi_extra=openapi("application/json"))

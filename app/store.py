@@ -47,6 +47,7 @@ class Measurement:
     manoeuvre : what was driven
     mapping : which of its columns are which channels where their names do not say it
     conditioning : what is done to it before it is used, {"steps": [...], "vehicle": {...} or None}
+    conditioned : what its notes say was done to it before it came here, a list of step records
     """
 
     id: str
@@ -60,6 +61,7 @@ class Measurement:
     manoeuvre: dict[str, Any] | None
     mapping: dict[str, Any] | None
     conditioning: dict[str, Any] | None
+    conditioned: list[dict[str, Any]] | None
 
 
 @dataclass(frozen=True)
@@ -242,6 +244,7 @@ class Store:
             measurements.c.manoeuvre,
             measurements.c.mapping,
             measurements.c.conditioning,
+            measurements.c.conditioned,
             mappings.c.body,
         )
         told = (
@@ -273,18 +276,24 @@ class Store:
             raise NotFound("There is no measurement with that id in this session.")
         return _measurement(row)
 
-    def set_noise(
+    def set_notes(
         self,
         session: str,
         measurement: str,
         noise: Mapping[str, float],
+        conditioned: Sequence[Mapping[str, Any]],
         summary: Mapping[str, Any],
     ) -> Measurement:
-        """Keep the noise that is stated of a measurement, and what is found in it with that."""
+        """Keep what notes say of a measurement, and what is found in it with that; `Busy` as of
+        files.
+        """
+        text = json.dumps([dict(one) for one in conditioned]) if conditioned else None
         return self._set_of(
             session,
             measurement,
+            more=len(text or ""),
             noise=json.dumps(dict(noise)),
+            conditioned=text,
             summary=json.dumps(dict(summary)),
         )
 
@@ -436,6 +445,7 @@ def _measurement(row: Row[Any]) -> Measurement:
         manoeuvre=row.manoeuvre and json.loads(row.manoeuvre),
         mapping=row.mapping and json.loads(row.mapping),
         conditioning=row.conditioning and json.loads(row.conditioning),
+        conditioned=row.conditioned and json.loads(row.conditioned),
     )
 
 

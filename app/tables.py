@@ -25,6 +25,7 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         "ALTER TABLE measurements ADD COLUMN mapping TEXT",
         "ALTER TABLE measurements ADD COLUMN conditioning TEXT",
     ),
+    ("ALTER TABLE measurements ADD COLUMN conditioned TEXT",),
 )
 """What leads from each version of the schema, the first being 1, to the next."""
 
@@ -75,6 +76,7 @@ measurements = Table(
     Column("manoeuvre", Text),
     Column("mapping", Text),
     Column("conditioning", Text),
+    Column("conditioned", Text),
 )
 
 mappings = Table(

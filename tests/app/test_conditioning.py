@@ -5,7 +5,10 @@ import json
 import numpy as np
 import pytest
 from ridetune.app.recordings import as_stated, stated
-from ridetune.engine.measurement import run_to_csv
+from ridetune.engine.conditioning.chain import condition, steps_from_json
+from ridetune.engine.measurement import parse_run, run_to_csv
+from ridetune.engine.run_notes import notes_of
+from ridetune.engine.step_record import step_record_to_json
 from ridetune.engine.vehicle_file import vehicle_to_json
 
 from ..factories import paper_vehicle
@@ -119,6 +122,23 @@ def test_notes_are_those_of_the_recording(visitor, kept):
     assert noted.status_code == 200, noted.text
     assert noted.json()["noise"] == {"chassis.z": 0.001, "chassis.roll_rate": 0.01}
     assert noted.json()["conditioning"] is not None
+
+
+def test_what_was_done_before_is_told_by_the_notes_and_stays(visitor):
+    """Oracle: the record that conditioning left with the run whose CSV and TOML are sent."""
+    run = parse_run(short_recording(), "lap.csv")
+    done = condition(run, steps_from_json([{"kind": "scale", "channel": "chassis.z", "gain": 2}]))
+    [before] = [step_record_to_json(one) for one in done.conditioning]
+    kept = visitor.upload(run_to_csv(done).encode(), "lap.csv").json()
+    assert kept["conditioned"] is None
+    notes = visitor.put(f"/measurements/{kept['id']}/notes", content=notes_of(done).encode())
+    assert notes.status_code == 200, notes.text
+    assert notes.json()["conditioned"] == [before]
+    assert visitor.get(address(kept)).json()["record"] == [before]
+    again = {"steps": [{"kind": "scale", "channel": "chassis.z", "gain": 0.5}]}
+    record = visitor.put(address(kept), json=again).json()["record"]
+    assert record[0] == before
+    assert [one["step"]["gain"] for one in record[1:]] == [0.5]
 
 
 @pytest.mark.parametrize(
