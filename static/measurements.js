@@ -245,8 +245,9 @@ function badges(row) {
     out.push(h("span", { className: "badge to-do", title: row.sign_suggestions.map(({ sentence }) => sentence).join("\n") },
       `check ${signs} sign${signs > 1 ? "s" : ""}`));
   }
-  if (row.conditioning) {
-    out.push(h("span", { className: "badge", title: row.conditioning.map(({ kind }) => kind).join(", ") }, "conditioned"));
+  const steps = [...(row.conditioned ?? []).map(({ step }) => step), ...(row.conditioning ?? [])];
+  if (steps.length) {
+    out.push(h("span", { className: "badge", title: steps.map(({ kind }) => kind).join(", ") }, "conditioned"));
   }
   return out.flatMap((badge) => [badge, " "]);
 }
