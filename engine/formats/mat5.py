@@ -6,6 +6,7 @@ structure of Time and Data, as a time series is exported, is one column. Names a
 Objects, functions and cells are left out.
 """
 
+import io
 import math
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from .listing import (
     numbers,
     plain,
 )
-from .mat5_heads import Head, heads
+from .mat5_heads import HEAD, Head, heads
 from .table import Array, Column, Table
 
 DEEPEST = 8
@@ -68,7 +69,7 @@ class Mat5File(Table):
         self._listing.add_timed(self._found)
         self.columns, self.warnings = self._listing.columns(), self._listing.warnings()
         self._places = self._listing.places
-        self._held: tuple[str, Any] = ("", None)
+        self._held: tuple[Head | None, Any] = (None, None)
 
     def _variable(self, head: Head) -> None:
         name, shape = head.name, head.shape
@@ -80,28 +81,33 @@ class Mat5File(Table):
         elif head.complex:
             self._listing.leave_out(name, "is complex")
         elif head.form in _NUMERIC:
-            self._array((plain(name),), name, shape, "", None)
+            self._array((plain(name),), name, shape, "", head)
         elif head.form == "struct" and elements > MOST_RECORDS:
             self._listing.leave_out(name, "is a structure of too many elements")
         elif head.form == "struct":
-            self._struct((plain(name),), self._load(name), 1)
+            self._struct((plain(name),), self._load(head), 1)
         else:
             self._listing.leave_out(name, _REASONS.get(head.form, "holds no plain numbers"))
 
-    def _load(self, name: str) -> Any:
+    def _load(self, head: Head) -> Any:
+        """One variable, as that of a file which holds no other: scipy looks through all before."""
         from scipy.io import loadmat
 
-        kept = loadmat(str(self._path), variable_names=[name], struct_as_record=True)
-        if name not in kept:
+        with self._path.open("rb") as stream:
+            alone = stream.read(HEAD)
+            stream.seek(head.begin)
+            alone += stream.read(head.length)
+        kept = loadmat(io.BytesIO(alone), struct_as_record=True)
+        if head.name not in kept:
             raise MeasurementError(
-                f"{self.source}: {plain(name) or 'a variable'} cannot be read; save it again."
+                f"{self.source}: {plain(head.name) or 'a variable'} cannot be read; save it again."
             )
-        return kept[name]
+        return kept[head.name]
 
     def _array(
         self, path: tuple[str, ...], name: str, shape: tuple[int, ...], unit: str, data: Any
     ) -> None:
-        """List a vector or matrix; `data` is the array itself, or None to load it by its name."""
+        """List a vector or matrix; `data` is the array itself, or the head to load it by."""
         if len(shape) != 2:
             self._listing.leave_out(name, "has more than two dimensions")
             return
@@ -116,7 +122,7 @@ class Mat5File(Table):
         for k, title in enumerate(matrix_columns(plain(name), width)):
             own = path if width == 1 else (*path[:-1], title)
             column = Column(title, unit, shape[along], ".".join(path[:-1]))
-            self._found.append((own, column, (name if data is None else data, along, k)))
+            self._found.append((own, column, (data, along, k)))
 
     def _struct(self, path: tuple[str, ...], records: Any, depth: int) -> None:
         """List what a structure, or an array of them, holds."""
@@ -153,7 +159,7 @@ class Mat5File(Table):
     def values(self, index: int) -> Array:
         """The numbers of one column."""
         data, along, k = self._places[index]
-        if isinstance(data, str):
+        if isinstance(data, Head):
             if self._held[0] != data:
                 self._held = (data, self._load(data))
             data = self._held[1]

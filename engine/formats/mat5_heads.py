@@ -25,12 +25,17 @@ _CLASSES = (
 
 
 class Head(NamedTuple):
-    """One variable; shape is () where it has none."""
+    """One variable; shape is () where it has none.
+
+    begin, length : of its element with its type and length, bytes
+    """
 
     name: str
     form: str
     shape: tuple[int, ...]
-    complex: bool = False
+    complex: bool
+    begin: int
+    length: int
 
 
 def heads(stream: BinaryIO) -> Iterator[Head]:
@@ -54,11 +59,11 @@ def heads(stream: BinaryIO) -> Iterator[Head]:
             kind, data = struct.unpack_from(f"{order}I", data)[0], data[8:]
         if kind != MATRIX:
             raise ValueError("type of element")
-        yield _head(data, order)
+        yield Head(*_head(data, order), start - 8, 8 + length)
         stream.seek(start + length)
 
 
-def _head(data: bytes, order: str) -> Head:
+def _head(data: bytes, order: str) -> tuple[str, str, tuple[int, ...], bool]:
     flags, at = _element(data, 0, order)
     (word,) = struct.unpack_from(f"{order}I", flags)
     number = word & 0xFF
@@ -68,7 +73,7 @@ def _head(data: bytes, order: str) -> Head:
         dimensions, at = _element(data, at, order)
         shape = struct.unpack(f"{order}{len(dimensions) // 4}i", dimensions)
     name, _ = _element(data, at, order)
-    return Head(name.rstrip(b"\0").decode("latin-1"), form, shape, bool(word & 0x800))
+    return name.rstrip(b"\0").decode("latin-1"), form, shape, bool(word & 0x800)
 
 
 def _element(data: bytes, at: int, order: str) -> tuple[bytes, int]:

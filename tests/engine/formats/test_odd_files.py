@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+import scipy.io
 from nptdms import ChannelObject, TdmsWriter
 from numpy.testing import assert_allclose
 from ridetune.engine.errors import MeasurementError, RideError
@@ -110,6 +111,18 @@ def test_converted_line_ends_of_plain_numbers_are_recognized(tmp_path, name):
     assert b"\n" in data
     wrong.write_bytes(data.replace(b"\n", b"\r\n"))
     assert "a conversion of line ends" in refusal(lambda: table(wrong, kind))
+
+
+def test_a_variable_of_a_mat_file_is_read_without_those_before_it(tmp_path, monkeypatch):
+    """Of thousands, each would else take the time of all."""
+    savemat(tmp_path / "r.mat", {"a": np.arange(5000.0), "z": files.Z})
+    read, given = scipy.io.loadmat, []
+    monkeypatch.setattr(
+        "scipy.io.loadmat",
+        lambda one, **how: given.append(one.getbuffer().nbytes) or read(one, **how),
+    )
+    assert_allclose(by_name(table(tmp_path / "r.mat", "MAT 5"))["z"][1], files.Z)
+    assert given == [128 + 56 + 8 * 5000, 128 + 56 + 8 * 50]
 
 
 def test_converted_line_ends_of_a_mat_file_of_one_variable_are_recognized(tmp_path):
