@@ -86,9 +86,9 @@ def _found(mapping: ChannelMapping, table: Table) -> dict[str, tuple[MappedColum
         other = taken.setdefault(where[0], entry)
         if other is not entry:
             raise MeasurementError(
-                f"{table.source}: the file has one column called {entry.column!r}, which the"
-                f" mapping takes for {other.channel} (group {other.group!r}) and for"
-                f" {entry.channel} (group {entry.group!r}); keep one of them."
+                f"{table.source}: the file has one column called '{entry.column}', which the"
+                f" mapping takes for {other.channel} (group '{other.group}') and for"
+                f" {entry.channel} (group '{entry.group}'); keep one of them."
             )
         found[entry.channel] = entry, where[0]
     return found
