@@ -17,6 +17,9 @@ Array = NDArray[np.float64]
 FEWEST_SAMPLES = 10
 """Fewest samples a measurement may have."""
 
+SHORTEST_STEP = 1e-12
+"""Time between samples, s, below which no clock counts; slopes over it would be no numbers."""
+
 COARSEST_STEP = 0.06
 """Time between samples, s, beyond which the unit of time is doubtful: no wheel's motion is left at
 it, and 0.1 is a step of 10,000 samples a second in ms.
@@ -34,7 +37,7 @@ def require_samples(count: int, source: str) -> None:
 
 def require_increasing(time: Array, place: Callable[[int], str], source: str) -> None:
     """Refuse a time (samples,), s, that does not increase strictly; `place` names a row."""
-    backwards = np.flatnonzero(np.diff(time) <= 0.0)
+    backwards = np.flatnonzero(np.diff(time) < SHORTEST_STEP)
     if backwards.size:
         row = int(backwards[0]) + 1
         kind = place(row).partition(" ")[0]

@@ -16,8 +16,8 @@ MOST_COLUMNS = 50_000
 MOST_SAMPLES = MOST_NUMBERS
 """Most samples of one column."""
 
-LONGEST_STEP, LATEST = 1e6, 1e12
-"""Longest time between two samples, and first time, that are believed, s."""
+SHORTEST_STEP, LONGEST_STEP, LATEST = 1e-12, 1e6, 1e12
+"""Times between two samples, and first time, that are believed, s."""
 
 WIDEST = 64
 """Most columns one array of two dimensions is taken for."""
@@ -108,7 +108,7 @@ class Listing:
 def _timed(column: Column) -> Column:
     """A column whose step is one, or that tells none."""
     step = column.step
-    if step is None or (0.0 < step < LONGEST_STEP and abs(column.start) < LATEST):
+    if step is None or (SHORTEST_STEP < step < LONGEST_STEP and abs(column.start) < LATEST):
         return column
     return replace(column, start=0.0, step=None)
 

@@ -19,6 +19,7 @@ from ridetune.engine.formats.listing import Listing, line_ends_converted, plain
 from ridetune.engine.formats.readers import read_as
 from ridetune.engine.formats.table import Column
 from ridetune.engine.measurement import parse_run, read_run
+from ridetune.engine.plausibility import require_increasing
 from scipy.io import savemat
 
 from tests import files_of_kinds as files
@@ -211,11 +212,17 @@ def test_numbers_that_measure_nothing_are_refused_where_they_stand(tmp_path):
     assert "sample 8, column chassis.z: 1e+300 is too large" in said
 
 
-@pytest.mark.parametrize("step", [1e308, 0.0, -1.0, float("nan"), float("inf")])
+@pytest.mark.parametrize("step", [1e308, 5e-324, 0.0, -1.0, float("nan"), float("inf")])
 def test_a_step_that_is_none_tells_no_time(step):
     listing = Listing("r.rsp", "RPC III")
     listing.add(Column("z", "m", 50, step=step), None)
     assert listing.columns()[0].step is None
+
+
+def test_times_closer_than_any_clock_counts_do_not_increase():
+    """Between them, a straight line would rise by more than a number holds."""
+    with pytest.raises(MeasurementError, match="r.csv: sample 2: time 4.940656458e-324 s does not"):
+        require_increasing(np.array([0.0, 5e-324, 1.0]), lambda k: f"sample {k + 1}", "r.csv")
 
 
 def test_an_error_is_one_line_whatever_it_repeats():
