@@ -73,7 +73,8 @@ def sweep(command: Parser) -> None:
 
 
 def condition(command: Parser) -> None:
-    command.add_argument("run_file", metavar="RUN", help="recording, CSV")
+    command.add_argument("run_file", metavar="RUN", help="recording")
+    _add_mapping(command)
     command.add_argument("--vehicle", metavar="FILE", help="vehicle or fit file, or a known car")
     how = command.add_mutually_exclusive_group()
     how.add_argument("--steps", metavar="FILE", help="steps, JSON; those suggested unless told")

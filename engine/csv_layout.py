@@ -2,14 +2,14 @@
 
 A file of ours begins with its header: the first line that is not blank names the columns, parted
 by the comma, semicolon or tab that is found in it most often. Only where the line below it is
-neither numbers nor a row of units of as many cells is the layout looked for: the first line of
+neither numbers nor a row of units of as many cells is the layout looked for: the first lines of
 numbers under a line of as many texts, of which the lower may hold units. Bars and runs of spaces
-are then separators too.
+are then separators too, and where there are no such lines, some cells may be remarks or dates.
 """
 
 import csv
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import islice
 from typing import NamedTuple
 
@@ -55,11 +55,15 @@ def find_layout(lines: Iterator[tuple[int, str]]) -> Layout | None:
         return plain
     head += islice(filled, MOST_LINES)
     delimiters = separator or ",;\t|"
-    found = [layout for one in delimiters if (layout := _searched(head, one))]
     # More columns are better; of as many, the delimiter that comes first; spaces, which names
-    # and units may hold, come last.
-    best = max(found, key=lambda layout: len(layout.titles), default=None)
-    return best or (separator is None and _searched(head, " ")) or _first_line(head, separator)
+    # and units may hold, come after them, and rows with remarks or dates last.
+    for several, holds in ((delimiters, _is_data), (" ", _is_data), (delimiters, _is_mixed)):
+        if several == " " and separator is not None:
+            continue
+        found = [layout for one in several if (layout := _searched(head, one, holds))]
+        if found:
+            return max(found, key=lambda layout: len(layout.titles))
+    return _first_line(head, separator)
 
 
 def _first_line(head: list[tuple[int, str]], separator: str | None) -> Layout:
@@ -88,11 +92,15 @@ def _plain(head: list[tuple[int, str]], separator: str | None) -> Layout | None:
     return layout if numeric and len(layout.titles) > 1 and len(rows[0]) >= 2 else None
 
 
-def _searched(head: list[tuple[int, str]], delimiter: str) -> Layout | None:
-    """The header above the first line of numbers, if the cells are parted by `delimiter`."""
+def _searched(
+    head: list[tuple[int, str]], delimiter: str, holds: Callable[[list[str]], bool]
+) -> Layout | None:
+    """The header above the first two lines that `holds` takes for samples, if the cells are parted
+    by `delimiter`.
+    """
     rows = [_trimmed(_cells(line, delimiter)) for _, line in head]
     for place in range(1, len(rows)):
-        if not _is_data(rows[place]):
+        if not all(map(holds, rows[place : place + 2])):
             continue
         width = len(rows[place])
         above, names = rows[place - 1], place - 1
@@ -102,7 +110,7 @@ def _searched(head: list[tuple[int, str]], delimiter: str) -> Layout | None:
         titles = [cell.lstrip("#%").strip() for cell in rows[names]]
         if delimiter == " ":
             titles = _joined(titles)
-        if len(titles) < width or len(titles) < 2 or _is_data(titles):
+        if len(titles) < width or len(titles) < 2 or _is_mixed(titles):
             return None
         shown = titles if units is None else _with_units(titles, units)
         return Layout(delimiter, head[place - 1][0], shown, delimiter == " ")
@@ -141,6 +149,15 @@ def _is_data(cells: list[str]) -> bool:
     return len(filled) >= 2 and all(
         _NUMBER.fullmatch(cell) or is_time_of_day(cell) for cell in filled
     )
+
+
+def _is_mixed(cells: list[str]) -> bool:
+    """Whether at least two cells, and half of those that are not empty, are such as in `_is_data`;
+    the others may be remarks or dates.
+    """
+    filled = [cell for cell in cells if cell]
+    data = sum(bool(_NUMBER.fullmatch(cell) or is_time_of_day(cell)) for cell in filled)
+    return data >= 2 and 2 * data >= len(filled)
 
 
 def _units(names: list[str], cells: list[str]) -> bool:

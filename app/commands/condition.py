@@ -10,10 +10,10 @@ from ...engine.conditioning.chain import condition as after
 from ...engine.conditioning.chain import read_steps, steps_to_json
 from ...engine.conditioning.suggestion import Suggestion, suggest
 from ...engine.errors import MeasurementError
-from ...engine.measurement import missing_for_identification, read_run, run_to_csv
+from ...engine.measurement import missing_for_identification, run_to_csv
 from ...engine.run_notes import notes_beside, notes_of, read_notes
 from .arguments import ArgumentError
-from .inputs import find_vehicle, recording_files
+from .inputs import find_mapping, find_vehicle, read_one, recording_files
 from .output import OutputError, print_warnings, require_place, write_file
 
 
@@ -23,7 +23,7 @@ def condition(options: Namespace) -> None:
         raise ArgumentError("--suggest does nothing to the run; leave out it or -o.")
     _require_places(options)
     vehicle = options.vehicle and find_vehicle(options.vehicle)
-    run = read_run(options.run_file)
+    run = read_one(options.run_file, find_mapping(options.mapping))
     suggestion = None if options.steps else suggest(run, vehicle)
     if options.suggest and suggestion:
         print(json.dumps(steps_to_json(suggestion.steps), indent=1))
@@ -65,7 +65,7 @@ def _require_places(options: Namespace) -> None:
     """Refuse places that cannot be written, or that hold notes of somebody else's."""
     if options.output is None:
         return
-    inputs = (options.vehicle, options.steps, *recording_files([options.run_file]))
+    inputs = (options.vehicle, options.steps, options.mapping, *recording_files([options.run_file]))
     beside = notes_beside(Path(options.output))
     for place in (options.output, beside):
         require_place(place, inputs)

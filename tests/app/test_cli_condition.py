@@ -1,8 +1,10 @@
 """`ridetune condition`: what it prints and writes, and what a fit says of its inputs."""
 
 import json
+import re
 
 import pytest
+from numpy.testing import assert_allclose
 from ridetune.app.cli import main
 from ridetune.engine.measurement import missing_for_identification, read_run, write_run
 from ridetune.engine.vehicle_file import write_vehicle
@@ -91,3 +93,26 @@ def test_steps_and_suggest_exclude_each_other(folder, capsys):
         main(["condition", "raw.csv", "--suggest", "--steps", "s.json"])
     assert ended.value.code == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_a_recording_of_another_house_is_conditioned_by_its_mapping(folder, capsys, raw):
+    """Oracle: the same recording by our names; its numbers are written with ten digits at least."""
+    names = {name: f"K{place}" for place, name in enumerate(raw.columns)}
+    theirs = (folder / "raw.csv").read_text()
+    for name, other in names.items():
+        theirs = theirs.replace(f"{name} [", f"{other} [", 1)
+    (folder / "theirs.csv").write_text(theirs)
+    assert main(["condition", "theirs.csv"]) == 2
+    assert "ridetune channels theirs.csv -o mapping.json" in capsys.readouterr().err
+    title = re.compile(r"(K\d+) \[(.*?)\]")
+    units = dict(title.findall(theirs.splitlines()[0]))
+    columns = [{"column": "time", "channel": "time", "unit": "s"}] + [
+        {"column": names[name], "channel": name, "unit": units[names[name]]} for name in names
+    ]
+    (folder / "mapping.json").write_text(json.dumps({"columns": columns}))
+    steps = ["--vehicle", "car.json", "-o"]
+    assert main(["condition", "raw.csv", *steps, "ours_done.csv"]) == 0
+    command = ["condition", "theirs.csv", "--mapping", "mapping.json", *steps, "done.csv"]
+    assert main(command) == 0, capsys.readouterr().err
+    ours, done = read_run("ours_done.csv"), read_run("done.csv")
+    assert_allclose(done["chassis.z"], ours["chassis.z"], rtol=0, atol=1e-9)
