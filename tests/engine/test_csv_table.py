@@ -266,6 +266,14 @@ LAYOUTS = {
         "Title;\nAuthor;Max\nZeit;Weg\ns;mm\n0;1,5\n0,1;2,5\n",
         ["Zeit [s]", "Weg [mm]"],
     ),
+    "a line above and a remark in the first row": (
+        "Project X\nZeit;Weg;Bemerkung\ns;mm\n0;1,5;Start\n0,1;2,5;\n",
+        ["Zeit [s]", "Weg [mm]", "Bemerkung"],
+    ),
+    "a line above and dates": (
+        "Project X; driver Y; car Z\nZeit;Weg;Datum\ns;mm;\n0;1,5;04.05.2026\n0,1;2,5;04.05.2026\n",
+        ["Zeit [s]", "Weg [mm]", "Datum"],
+    ),
     "spaces": ("# time   chassis.z\n 0.0   1.5\n 0.1   2.5\n", ["time", "chassis.z"]),
     "spaces and units": ("log 7\ntime [s]  chassis.z [mm]\n0  1.5\n0.1  2.5\n", PAIR),
     "bars": ("time [s]|chassis.z [mm]\n0|1.5\n0.1|2.5\n", PAIR),
