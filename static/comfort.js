@@ -68,14 +68,12 @@ const find = (head, name) => head?.metrics.find((metric) => metric.name === name
 
 function row(metric, before, within) {
   const factor = metric.display_factor ?? 1;
-  const change = before && Math.abs(before.value) > 1e-12
-    ? (metric.value - before.value) / Math.abs(before.value) : null;
   return h("tr", {},
     h("th", { scope: "row", title: metric.meaning ?? "" }, metric.label),
     h("td", {}, before ? units.number(before.value * factor, 3) : "–"),
     h("td", {}, units.number(metric.value * factor, 3), within ? spread(within.interval, factor) : null),
     h("td", { className: "unit" }, units.pretty(metric.display_unit ?? metric.unit)),
-    changed(change));
+    changed(metric, before));
 }
 
 /** How far the errors of the fit leave a figure open. */
@@ -86,14 +84,18 @@ function spread(interval, factor) {
     open ? " ± ∞" : ` ± ${units.number(factor * (high - low) / 2, 2)}`);
 }
 
-/** Less is better in every metric; arrows say it without colour. */
-function changed(change) {
-  if (change === null) return h("td", {}, "–");
+/** The least load of a tyre; of all else less is better, in either sense. */
+const HOLDS = /^tyre\.\w+\.load\.(least|p01)$/;
+
+/** By how much a metric has changed; arrows say which way without colour. */
+function changed(metric, before) {
+  if (!before || Math.abs(before.value) <= 1e-12) return h("td", {}, "–");
+  const change = (metric.value - before.value) / Math.abs(before.value);
   if (Math.abs(change) < SAME) return h("td", { className: "same" }, "same");
-  const less = change < 0;
+  const better = HOLDS.test(metric.name) ? change > 0 : Math.abs(metric.value) < Math.abs(before.value);
   const size = Math.abs(change) >= 9.995 ? `×${units.number(1 + change, 3)}`
     : `${units.number(100 * Math.abs(change), 2)} %`;
-  return h("td", { className: less ? "less" : "more" }, `${less ? "▼" : "▲"} ${size}`);
+  return h("td", { className: better ? "better" : "worse" }, `${change < 0 ? "▼" : "▲"} ${size}`);
 }
 
 /** How far the simulated motion follows the measured one, channel by channel. */

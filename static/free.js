@@ -158,7 +158,7 @@ function freeRow(parameter) {
     });
     const doubt = doubtOf(start, both);
     begins.textContent = units.number(start * factor);
-    begins.className = doubt && free.checked ? "more" : "";
+    begins.className = doubt && free.checked ? "worse" : "";
     begins.title = doubt;
     row.className = free.checked ? "" : "off";
   };

@@ -78,7 +78,7 @@ function ofAnotherCar(result) {
   if (isOfThisCar(result)) return null;
   const { vehicle } = result;
   const now = get("vehicle");
-  return h("p", { className: "more", id: "other-car" }, vehicle.name === now.name
+  return h("p", { className: "worse", id: "other-car" }, vehicle.name === now.name
     ? "Found before the car's known data were changed; identify again."
     : `Found for “${vehicle.name}”, but the sliders belong to “${now.name}”.`);
 }

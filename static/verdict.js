@@ -99,7 +99,7 @@ function priors({ priors: given = [] }) {
         return h("tr", { title: unit }, h("th", { scope: "row" }, symbolOf(one.name)),
           h("td", {}, both(one.mean, one.deviation)),
           h("td", {}, one.without === null ? "not told" : both(one.without, one.without_std_error)),
-          h("td", { className: far ? "more" : "soft", title: "In combined standard errors" },
+          h("td", { className: far ? "worse" : "soft", title: "In combined standard errors" },
             one.apart === null ? "–" : `${units.number(Math.abs(one.apart), 2)} σ${far ? " !" : ""}`));
       }))));
 }
