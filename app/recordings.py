@@ -23,6 +23,7 @@ from ..engine.remembered import Remembered
 from ..engine.rims_settings import RimsSettings
 from ..engine.run_notes import doubtful_noise
 from ..engine.step_record import step_records_from_json
+from .errors import NotFound
 from .store import Measurement, NewMeasurement, Store
 
 if TYPE_CHECKING:
@@ -191,6 +192,8 @@ def _readable(name: str) -> Iterator[None]:
             f"{name}: the file is too large or too deep to read ({type(error).__name__}); "
             "send a plain CSV."
         ) from None
+    except FileNotFoundError:
+        raise NotFound(f"{name} has been deleted meanwhile; choose another measurement.") from None
     except OSError as error:
         raise MeasurementError(
             f"{name}: there is no room to read the file ({error.strerror}); try again later."

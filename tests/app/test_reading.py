@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import pytest
+from ridetune.app.errors import NotFound
 from ridetune.app.recordings import Recordings
 from ridetune.app.settings import Limits, Settings
 from ridetune.engine.errors import MeasurementError
@@ -146,3 +147,14 @@ def test_a_file_is_read_again_under_a_name_of_another_kind(client, gate):
     assert shared.recordings.run(measurement).name == "run.csv"
     with pytest.raises(MeasurementError, match=r"run\.mat: the file is no MAT file"):
         shared.recordings.run(replace(measurement, name="run.mat"))
+
+
+def test_a_recording_that_is_deleted_while_it_waits_to_be_read_is_not_found(client, gate):
+    visitor = Visitor(client)
+    gate.open.set()
+    kept = visitor.upload(short_recording(samples=57)).json()
+    shared = client.app.state.services
+    measurement = shared.store.measurement(visitor.id, kept["id"])
+    assert visitor.delete(f"/measurements/{kept['id']}").status_code == 204
+    with pytest.raises(NotFound, match=r"run\.csv has been deleted meanwhile"):
+        Recordings(shared.store).run(measurement)

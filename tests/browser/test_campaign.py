@@ -48,6 +48,8 @@ def test_the_recordings_of_a_campaign_become_measurements(driver):
     assert loading.value.suggested_filename == "campaign.zip"
     # A recording that was deleted can be added again.
     page.locator(".pick button", has_text="manoeuvre_bump").click()
+    drawn = page.locator(".measurement-detail canvas")
+    driver.wait(lambda: drawn.count() > 0, "its histories to be drawn")
     driver.element(".measurement-detail .danger").click()
     driver.element(".measurement-detail .danger").click()
     driver.click("#take-over")
