@@ -303,7 +303,7 @@ def _knowledge(free: Sequence[FreeParameter], errors: Uncertainty) -> tuple[Know
 
 def _bits(free: Sequence[FreeParameter], errors: Uncertainty) -> float:
     """-1/2 log2 det of the covariance between what the bounds admit and what is close enough."""
-    spans = [abs(one.variable(one.upper) - one.variable(one.lower)) for one in free]
+    spans = [high - low for low, high in (one.ends for one in free)]
     admitted = np.diag(np.square(spans) / 12.0)
     covariance = errors.covariance + OPEN**2 * errors.unknown.T @ errors.unknown
     # (C^-1 + W^-1)^-1 without inverting C
