@@ -2,13 +2,16 @@
 
 import argparse
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 from ..engine.search_settings import LossName
 from .command_parser import Parser
 from .plants import PLANTS
 
 LARGEST_SEED = 2**53
+
+SEVERAL: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
+"""An option with a list of values, which may be given again with more of them."""
 
 
 def serve(command: Parser) -> None:
@@ -39,15 +42,14 @@ def channels(command: Parser) -> None:
 
 def sweep(command: Parser) -> None:
     _add_excitation(command)
-    several = {"nargs": "+", "action": "extend", "default": []}
     command.add_argument(
         "--levels",
         metavar="NAME=LOW:HIGH:COUNT",
-        **several,
+        **SEVERAL,
         help="every combination of levels, SI units; or NAME=V1,V2,...",
     )
     command.add_argument(
-        "--range", metavar="NAME=LOW:HIGH", **several, help="cars drawn from a box, SI units"
+        "--range", metavar="NAME=LOW:HIGH", **SEVERAL, help="cars drawn from a box, SI units"
     )
     command.add_argument("--cars", metavar="N", help="how many are drawn")
     command.add_argument(
@@ -100,14 +102,13 @@ def identify(command: Parser) -> None:
 
 def validate(command: Parser) -> None:
     _add_identification(command)
-    several = {"nargs": "+", "action": "extend", "default": []}
     command.add_argument(
-        "--hold-out", metavar="RUN", **several, help="recordings to predict, not fitted"
+        "--hold-out", metavar="RUN", **SEVERAL, help="recordings to predict, not fitted"
     )
     command.add_argument(
         "--manoeuvre",
         metavar="RUN=NAME",
-        **several,
+        **SEVERAL,
         help="what was driven: a known one or a file; untold, RUN's own NAME.manoeuvre.json",
     )
     command.add_argument(
@@ -122,12 +123,11 @@ def validate(command: Parser) -> None:
 def advise(command: Parser) -> None:
     command.add_argument("runs", metavar="RUN", nargs="*", help="recordings so far, CSV")
     _add_vehicle(command)
-    several = {"nargs": "+", "action": "extend", "default": []}
     command.add_argument(
-        "--candidates", metavar="NAME", **several, help="known manoeuvres or files; many untold"
+        "--candidates", metavar="NAME", **SEVERAL, help="known manoeuvres or files; many untold"
     )
     command.add_argument(
-        "--planned", metavar="NAME", **several, help="manoeuvres that will be driven in any case"
+        "--planned", metavar="NAME", **SEVERAL, help="manoeuvres that will be driven in any case"
     )
     _add_mapping(command)
     _add_noise(command, "noise of the recordings and, without any, of the sensors")
@@ -139,16 +139,15 @@ def _add_identification(command: Parser) -> None:
     command.add_argument("runs", metavar="RUN", nargs="+", help="recording")
     _add_mapping(command)
     _add_vehicle(command)
-    several = {"nargs": "+", "action": "extend", "default": []}
-    command.add_argument("--free", metavar="NAME", **several, help="identify these alone")
-    command.add_argument("--fixed", metavar="NAME", **several, help="identify all but these")
+    command.add_argument("--free", metavar="NAME", **SEVERAL, help="identify these alone")
+    command.add_argument("--fixed", metavar="NAME", **SEVERAL, help="identify all but these")
     command.add_argument(
         "--damper",
         choices=("linear", "two-slope"),
         help="two-slope: identify rebound ratios and knee speeds, too",
     )
-    command.add_argument("--bounds", metavar="NAME=LOW:HIGH", **several, help="SI units")
-    command.add_argument("--start", metavar="NAME=VALUE", **several, help="SI units")
+    command.add_argument("--bounds", metavar="NAME=LOW:HIGH", **SEVERAL, help="SI units")
+    command.add_argument("--start", metavar="NAME=VALUE", **SEVERAL, help="SI units")
     command.add_argument("--starts", metavar="N", help="try so many starts between the bounds")
     command.add_argument("--seed", metavar="N", type=_seed, help="other starts")
     command.add_argument(
@@ -160,19 +159,19 @@ def _add_identification(command: Parser) -> None:
     command.add_argument(
         "--prior",
         metavar="NAME=VALUE~DEVIATION",
-        **several,
+        **SEVERAL,
         help="known from a drawing, SI units; or ~PERCENT%%",
     )
     command.add_argument(
         "--sensor",
         metavar="CHANNEL.QUANTITY=VALUE",
-        **several,
+        **SEVERAL,
         help="what a sensor is known to do: delay, gain, bias, sign or noise, SI units",
     )
     command.add_argument(
         "--fit-sensor",
         metavar="CHANNEL.QUANTITY",
-        **several,
+        **SEVERAL,
         help="identify it too: delay, gain, bias or noise",
     )
     command.add_argument(
