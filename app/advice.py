@@ -6,10 +6,10 @@ Imported with the first request, because it brings numba and scipy.
 from collections.abc import Mapping
 from typing import Any
 
-from ..engine.advice_file import advisory_to_json
-from ..engine.advisor import advise, advise_unmeasured
-from ..engine.candidates import catalogue
 from ..engine.channels import INPUT_CHANNELS, OUTPUT_CHANNELS
+from ..engine.identification.advice_file import advisory_to_json
+from ..engine.identification.advisor import advise, advise_unmeasured
+from ..engine.identification.candidates import catalogue
 from ..engine.manoeuvre import Manoeuvre, manoeuvre_from_json
 from ..engine.vehicle_file import vehicle_from_json
 from .errors import InvalidRequest, OverBudget

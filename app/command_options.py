@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any, get_args
 
-from ..engine.search_settings import LossName
+from ..engine.identification.search_settings import LossName
 from .command_parser import Parser
 from .plants import PLANTS
 

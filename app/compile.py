@@ -15,11 +15,11 @@ def _free() -> None:
     """One car and a batch on the rig and on the road, which share their kernels."""
     import numpy as np
 
-    from ..engine.car_rows import car_row
-    from ..engine.integration import free_states
     from ..engine.manoeuvre import reference_manoeuvres
-    from ..engine.simulation import FREE_STEP, SAMPLE_STEP, simulate_posts
-    from ..engine.stepping import prepare_free
+    from ..engine.simulation.car_rows import car_row
+    from ..engine.simulation.integration import free_states
+    from ..engine.simulation.simulate import FREE_STEP, SAMPLE_STEP, simulate_posts
+    from ..engine.simulation.stepping import prepare_free
     from ..engine.vehicle_file import reference_vehicles
 
     car = reference_vehicles()["paper"]
@@ -33,10 +33,10 @@ def _rims() -> None:
     """One car and a batch on rims that stand still."""
     import numpy as np
 
-    from ..engine.car_rows import car_row
     from ..engine.channels import INPUT_CHANNELS, Run
-    from ..engine.rims import prepare
-    from ..engine.simulation import rims_batch, simulate_rims
+    from ..engine.simulation.car_rows import car_row
+    from ..engine.simulation.rims import prepare
+    from ..engine.simulation.simulate import rims_batch, simulate_rims
     from ..engine.vehicle_file import reference_vehicles
 
     car, time = reference_vehicles()["paper"], np.linspace(0.0, 0.5, 101)

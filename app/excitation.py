@@ -9,11 +9,11 @@ from difflib import get_close_matches
 from typing import Literal
 
 from ..engine.channels import Run
-from ..engine.excitation import Excitation, FreeExcitation, RimsExcitation
 from ..engine.manoeuvre import Manoeuvre, manoeuvre_from_json, reference_manoeuvres
-from ..engine.recorded_motion import RecordedMotion, recorded_motion
-from ..engine.road_specs import road_spec_from_json
-from ..engine.simulation import SAMPLE_STEP, default_step
+from ..engine.roads.road_specs import road_spec_from_json
+from ..engine.simulation.excitation import Excitation, FreeExcitation, RimsExcitation
+from ..engine.simulation.recorded_motion import RecordedMotion, recorded_motion
+from ..engine.simulation.simulate import SAMPLE_STEP, default_step
 from ..engine.vehicle import Vehicle
 from .errors import InvalidRequest, NotFound
 from .recordings import Recordings, with_braking

@@ -77,10 +77,10 @@ def marked_runs(
 
 def build_problem(spec: Mapping[str, Any], runs: list[Run]) -> Any:
     """The engine's problem; raises what a person can mend."""
-    from ..engine.loss import Loss
-    from ..engine.problem import Problem
-    from ..engine.residuals import check_start
-    from ..engine.rims_settings import RimsSettings
+    from ..engine.identification.loss import Loss
+    from ..engine.identification.problem import Problem
+    from ..engine.identification.residuals import check_start
+    from ..engine.simulation.rims_settings import RimsSettings
     from ..engine.vehicle_file import vehicle_from_json
 
     problem = Problem.build(
@@ -104,8 +104,8 @@ def build_problem(spec: Mapping[str, Any], runs: list[Run]) -> Any:
 
 def identify_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -> dict[str, Any]:
     """On the worker: fit, reporting after every evaluation; the fit as JSON."""
-    from ..engine.fit_file import fit_to_json
-    from ..engine.identification import identify
+    from ..engine.identification.fit_file import fit_to_json
+    from ..engine.identification.identify import identify
 
     costs: list[float] = []
 
@@ -155,8 +155,8 @@ def check_budget(
 
     step : of the integration, s
     """
-    from ..engine.multistart import fits_of
-    from ..engine.noise_rounds import NOISE_ROUNDS
+    from ..engine.identification.multistart import fits_of
+    from ..engine.identification.noise_rounds import NOISE_ROUNDS
 
     total = sum(
         max(kept.summary["samples"], kept.summary["duration"] / step) for kept in measurements

@@ -37,8 +37,8 @@ def profile_parameter(
     payload: Any, report: Report, cancelled: Callable[[], bool]
 ) -> dict[str, Any]:
     """On the worker: the profile as JSON, reporting after every point."""
-    from ..engine.fit_file import profile_to_json
-    from ..engine.profile import profile
+    from ..engine.identification.fit_file import profile_to_json
+    from ..engine.identification.profile import profile
 
     found = profile(
         build_problem(payload, payload["runs"]).as_fitted(payload["ended"]),

@@ -20,8 +20,8 @@ import numpy as np
 from ..engine.channels import Run, channel
 from ..engine.errors import MeasurementError, UnmappedError
 from ..engine.remembered import Remembered
-from ..engine.rims_settings import RimsSettings
 from ..engine.run_notes import doubtful_noise
+from ..engine.simulation.rims_settings import RimsSettings
 from ..engine.step_record import step_records_from_json
 from .errors import NotFound
 from .store import Measurement, NewMeasurement, Store
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from ..engine.formats.child import Bounds, ChildTable
     from ..engine.formats.table import Table
     from ..engine.mapping.survey import Survey
-    from ..engine.recorded_motion import RecordedMotion
+    from ..engine.simulation.recorded_motion import RecordedMotion
 
 REMEMBERED_VALUES = 8_000_000
 """Numbers kept in memory over all runs, and as many over all motions: 64 MB."""
@@ -108,7 +108,7 @@ class Recordings:
         noise that conditioning asks for.
         """
         # It brings scipy, which is loaded with the first simulation.
-        from ..engine.recorded_motion import recorded_motion
+        from ..engine.simulation.recorded_motion import recorded_motion
 
         run = with_braking(self.run(measurement), braking)
         motion = self._motions.made(

@@ -174,8 +174,8 @@ def _sensors(data: bytes, name: str) -> dict[str, Any]:
 @router.get("/roads")
 def roads() -> dict[str, Any]:
     """What a road can be made of."""
-    from ..engine.iso8608 import Coherence
-    from ..engine.road_specs import RoadClass, RoadSpec
+    from ..engine.roads.iso8608 import Coherence
+    from ..engine.roads.road_specs import RoadClass, RoadSpec
 
     return {
         "kinds": [kind.kind for kind in get_args(RoadSpec)],
@@ -187,7 +187,7 @@ def roads() -> dict[str, Any]:
 @router.post("/roads/preview")
 def preview(request: RoadPreview) -> dict[str, list[float]]:
     """Both tracks of a road, sampled evenly."""
-    from ..engine.road_specs import Place, road_spec_from_json
+    from ..engine.roads.road_specs import Place, road_spec_from_json
 
     spec = road_spec_from_json(request.road)
     road = spec.build(Place(0.0, request.torque_end, request.length), request.seed)

@@ -85,7 +85,7 @@ def cars(
 
 def _converted(kept: Path, form: Literal["arrow", "csv"]) -> Iterator[bytes]:
     """A kept file in another form, by way of the disk: CSV may be large."""
-    from ..engine.sweep_file import read_blocks, write_blocks
+    from ..engine.sweeps.sweep_file import read_blocks, write_blocks
 
     with TemporaryFile() as stream:
         with kept.open("rb") as file:

@@ -21,22 +21,22 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from ..engine import rims_settings
-from ..engine.rims_settings import (
-    HIGHEST_HIGHPASS,
-    LOWEST_CUTOFF,
-    LOWEST_HIGHPASS,
-    InitialState,
-    RimsSettings,
-)
-from ..engine.search_settings import (
+from ..engine.identification.search_settings import (
     DEFAULT_SCALE,
     LARGEST_SCALE,
     MOST_STARTS,
     SMALLEST_SCALE,
     LossName,
 )
-from ..engine.step_limits import LONGEST_SAMPLE_STEP, LONGEST_STEP, SHORTEST_STEP
+from ..engine.simulation import rims_settings
+from ..engine.simulation.rims_settings import (
+    HIGHEST_HIGHPASS,
+    LOWEST_CUTOFF,
+    LOWEST_HIGHPASS,
+    InitialState,
+    RimsSettings,
+)
+from ..engine.simulation.step_limits import LONGEST_SAMPLE_STEP, LONGEST_STEP, SHORTEST_STEP
 
 Number = Annotated[FiniteFloat, Strict()]
 Whole = Annotated[int, Strict()]

@@ -9,11 +9,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from ..engine.bands import Bands, bands
 from ..engine.channels import Run, channel
-from ..engine.excitation import Excitation
-from ..engine.kept_fit import fit_from_json
-from ..engine.metrics import Metric, metrics
+from ..engine.identification.bands import Bands, bands
+from ..engine.identification.kept_fit import fit_from_json
+from ..engine.simulation.excitation import Excitation
+from ..engine.simulation.metrics import Metric, metrics
 from ..engine.vehicle import Vehicle
 from ..engine.vehicle_file import vehicle_from_json
 from .errors import OverBudget

@@ -49,7 +49,7 @@ def as_asked(request: SweepRequest) -> str:
 
 def design_of(form: Any) -> Any:
     """The engine's design; raises what a person can mend."""
-    from ..engine.designs import FullFactorial, LatinHypercube, Sobol, Spaced
+    from ..engine.sweeps.designs import FullFactorial, LatinHypercube, Sobol, Spaced
 
     if isinstance(form, FullFactorialForm):
         return FullFactorial(
@@ -66,7 +66,7 @@ def design_of(form: Any) -> Any:
 
 def most_bytes(request: SweepRequest) -> int:
     """How large the file can become."""
-    from ..engine.sweep import columns
+    from ..engine.sweeps.sweep import columns
 
     design = design_of(request.design)
     return FRAME_BYTES + design.cars * (8 * len(columns(design)) + STATUS_BYTES)
@@ -81,8 +81,8 @@ def check_and_fill(
 ) -> dict[str, Any]:
     """Everything that the job needs, checked, with what holds untold filled in."""
     from ..engine.manoeuvre import manoeuvre_to_json
-    from ..engine.sweep_checks import check_sweep, stepped_alike, threads_of, typical_cars
-    from ..engine.sweep_file import require_package
+    from ..engine.sweeps.sweep_checks import check_sweep, stepped_alike, threads_of, typical_cars
+    from ..engine.sweeps.sweep_file import require_package
     from ..engine.vehicle_file import vehicle_from_json, vehicle_to_json
     from .excitation import excitation_of, extent, manoeuvre_of, mode_of
 
@@ -127,8 +127,8 @@ def _check_budget(cars: int, steps: float, limits: Limits) -> None:
 
 def sweep_cars(payload: Any, report: Report, cancelled: Callable[[], bool]) -> WithFile:
     """On the worker: sweep, reporting how many cars are done; the rows as Parquet."""
-    from ..engine.sweep import sweep as sweep_through
-    from ..engine.sweep_file import description, write_blocks
+    from ..engine.sweeps.sweep import sweep as sweep_through
+    from ..engine.sweeps.sweep_file import description, write_blocks
     from ..engine.vehicle_file import vehicle_from_json
     from .excitation import excitation_of
 

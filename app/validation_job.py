@@ -111,9 +111,9 @@ def _cases(spec: Mapping[str, Any], runs: list[Any]) -> list[Any]:
 
 def validate_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -> WithFile:
     """On the worker: predict every run, reporting how far it is; the document as a file."""
-    from ..engine.rims_settings import RimsSettings
-    from ..engine.sensing import corrected
-    from ..engine.sensor_model import readings_in
+    from ..engine.identification.sensing import corrected
+    from ..engine.identification.sensor_model import readings_in
+    from ..engine.simulation.rims_settings import RimsSettings
     from ..engine.validation import geometry_from_json, validate
     from ..engine.validation_file import validation_to_json
     from .report import made

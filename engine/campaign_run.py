@@ -12,8 +12,8 @@ from typing import Any
 
 from .campaign import Campaign, Recording
 from .errors import CampaignError, Cancelled
-from .integration import cores
 from .plant import Asked
+from .simulation.integration import cores
 
 LOOK_EVERY = 0.1
 """Time between two looks at how far the processes are, s."""

@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 
 from .equilibrium import loads_at_rest
 from .frames import CORNERS, CREEP_SPEED, GRAVITY
-from .road import Road
+from .roads.road import Road
 from .vehicle import Vehicle
 
 SAME_INSTANT = 1e-9

@@ -22,8 +22,8 @@ from .json_record import RecordReader, record_to_json
 from .json_text import read_json
 from .post_sweep import PostSweep
 from .remembered import Remembered
-from .road import Road
-from .road_specs import FlatRoad, IsoRoad, Place, RoadSpec
+from .roads.road import Road
+from .roads.road_specs import FlatRoad, IsoRoad, Place, RoadSpec
 from .torque_laws import LONGEST, BrakeLaw, DriveLaw, Speed
 from .vehicle import Pivot, Range, StabilizerBar, Suspension, Vehicle, field_types
 

@@ -11,8 +11,8 @@ from typing import Any, Protocol
 from .channels import CHANNELS, RAW_CHANNELS, Run
 from .errors import SimulationDiverged
 from .manoeuvre import Manoeuvre
-from .output_channels import DEFAULT_POINTS, Points
-from .simulation import FREE_STEP, simulate_road
+from .simulation.output_channels import DEFAULT_POINTS, Points
+from .simulation.simulate import FREE_STEP, simulate_road
 from .vehicle import Vehicle
 from .vehicle_file import vehicle_to_json
 

@@ -14,17 +14,24 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from .channels import OUTPUT_CHANNELS, Run
-from .compared_runs import distinct_names, same_data
 from .errors import Cancelled, ManoeuvreError, ProblemError, RideError, VehicleError
+from .identification.compared_runs import distinct_names, same_data
 from .json_record import RecordReader
 from .manoeuvre import Manoeuvre
 from .measurement import missing_for_identification
-from .metrics import pushes
 from .rating import Rating, rate
-from .rims import filtered_outputs
-from .rims_settings import RimsSettings
-from .road_spectrum import RoadSpectrum, road_spectra
-from .simulation import Model, Simulation, Traction, fit_percent, simulate_rims, simulate_road
+from .roads.road_spectrum import RoadSpectrum, road_spectra
+from .simulation.metrics import pushes
+from .simulation.rims import filtered_outputs
+from .simulation.rims_settings import RimsSettings
+from .simulation.simulate import (
+    Model,
+    Simulation,
+    Traction,
+    fit_percent,
+    simulate_rims,
+    simulate_road,
+)
 from .vehicle import Pivot, Vehicle
 
 Array = NDArray[np.float64]

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .channels import OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
-from .fit_file import plain
 from .frames import CORNERS
-from .iso8608 import CLASSES, REFERENCE_FREQUENCY
+from .identification.fit_file import plain
 from .manoeuvre import manoeuvre_to_json
-from .road_spectrum import RoadSpectrum
+from .roads.iso8608 import CLASSES, REFERENCE_FREQUENCY
+from .roads.road_spectrum import RoadSpectrum
 from .validation import Geometry, Prediction, Score, ValidatedRun, Validation
 
 MOST_SAMPLES = 4001

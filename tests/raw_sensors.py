@@ -8,7 +8,7 @@ import numpy as np
 from ridetune.engine.channels import Run
 from ridetune.engine.frames import CORNERS
 from ridetune.engine.manoeuvre import reference_manoeuvres
-from ridetune.engine.simulation import simulate_road
+from ridetune.engine.simulation.simulate import simulate_road
 from scipy.interpolate import CubicSpline
 
 G = 9.81

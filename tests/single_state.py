@@ -1,10 +1,10 @@
 """The engine's accelerations in a single state, as the independent programs give them."""
 
 import numpy as np
-from ridetune.engine.car_rows import car_row
-from ridetune.engine.integration import free_outputs, rims_outputs
-from ridetune.engine.output_channels import corner_output
-from ridetune.engine.road import Road
+from ridetune.engine.roads.road import Road
+from ridetune.engine.simulation.car_rows import car_row
+from ridetune.engine.simulation.integration import free_outputs, rims_outputs
+from ridetune.engine.simulation.output_channels import corner_output
 
 
 def accelerations(vehicle, q, qd, *, road_height, road_rate, drive, brake, lift_off=False):

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.testing import assert_allclose
 from ridetune.engine.kernels.histogram import BINS, LOAD_FROM, LOAD_TO, TRAVEL_FROM, TRAVEL_TO
-from ridetune.engine.metrics import metrics
+from ridetune.engine.simulation.metrics import metrics
 
 WEIGHTING_ERROR = 5e-4
 """Of a parabola through instants h = 1.25 ms apart, (w h)^3 / 12 at the wheels' 15 Hz, and of the

@@ -4,14 +4,14 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from ...engine.designs import Sobol
-from ...engine.excitation import FreeExcitation
-from ...engine.identification import Problem, identify
-from ...engine.integration import cores
+from ...engine.identification.identify import Problem, identify
 from ...engine.manoeuvre import reference_manoeuvres
 from ...engine.measurement import read_run
-from ...engine.simulation import FREE_STEP, simulate_road
-from ...engine.sweep import sweep
+from ...engine.simulation.excitation import FreeExcitation
+from ...engine.simulation.integration import cores
+from ...engine.simulation.simulate import FREE_STEP, simulate_road
+from ...engine.sweeps.designs import Sobol
+from ...engine.sweeps.sweep import sweep
 from ...engine.vehicle_file import read_vehicle
 from ..package_files import package_folder
 from .modes import STAGES, Mode, road_mode, some_cars, the_car, the_demand

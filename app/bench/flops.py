@@ -143,11 +143,11 @@ def _count() -> dict[str, int]:
     math.sqrt = square_root  # the kernels take it from there when they are imported
     import numpy as np
 
-    from ...engine.car_rows import car_row
     from ...engine.kernels.buffer import ROWS, STAGE, take_car
     from ...engine.kernels.free import free_slopes
     from ...engine.kernels.on_rims import rim_slopes
-    from ...engine.road import Road
+    from ...engine.roads.road import Road
+    from ...engine.simulation.car_rows import car_row
     from ...engine.vehicle_file import reference_vehicles
 
     def traced(trace, values):

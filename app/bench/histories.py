@@ -10,12 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...engine.car_rows import car_row
 from ...engine.demand import Demand
 from ...engine.frames import CORNERS, CREEP_SPEED
-from ...engine.integration import free_outputs, free_states
-from ...engine.output_channels import corner_output
-from ...engine.stepping import prepare_free
+from ...engine.simulation.car_rows import car_row
+from ...engine.simulation.integration import free_outputs, free_states
+from ...engine.simulation.output_channels import corner_output
+from ...engine.simulation.stepping import prepare_free
 from ...engine.vehicle import Vehicle
 from .car_points import Corner
 from .modes import FINER

@@ -6,7 +6,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from ...engine.integration import cores
+from ...engine.simulation.integration import cores
 
 EXTENSIONS = ("sse4_2", "avx", "avx2", "fma", "avx512f", "neon", "asimd", "sve")
 """Vector instructions that matter, as Linux calls them."""

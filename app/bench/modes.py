@@ -12,17 +12,17 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ...engine.car_rows import car_rows
 from ...engine.demand import Demand, PiecewiseLinear, PostMotion
 from ...engine.frames import CORNERS
-from ...engine.integration import free_states, rims_states
 from ...engine.manoeuvre import reference_manoeuvres
 from ...engine.measurement import read_run
 from ...engine.parameters import PARAMETER_NAMES
-from ...engine.rims import prepare
-from ...engine.rims_settings import RimsSettings
-from ...engine.simulation import FREE_STEP, simulate_road
-from ...engine.stepping import prepare_free
+from ...engine.simulation.car_rows import car_rows
+from ...engine.simulation.integration import free_states, rims_states
+from ...engine.simulation.rims import prepare
+from ...engine.simulation.rims_settings import RimsSettings
+from ...engine.simulation.simulate import FREE_STEP, simulate_road
+from ...engine.simulation.stepping import prepare_free
 from ...engine.vehicle import Vehicle
 from ...engine.vehicle_file import reference_vehicles
 from ..package_files import package_folder

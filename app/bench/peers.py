@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...engine.simulation import FREE_STEP
+from ...engine.simulation.simulate import FREE_STEP
 from .cases import Case
 from .modes import STAGES, relative_error, the_car, the_demand
 from .row import Row

@@ -6,8 +6,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ...engine.car_rows import car_row
-from ...engine.simulation import FREE_STEP
+from ...engine.simulation.car_rows import car_row
+from ...engine.simulation.simulate import FREE_STEP
 from . import flops
 from .histories import Histories, histories
 from .modes import Mode, posts_mode, rims_mode, road_mode, some_cars, the_car, the_demand

@@ -7,17 +7,17 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from ...engine.advice_file import advisory_to_json
-from ...engine.advisor import Advisory, advise_unmeasured
-from ...engine.advisor import advise as advise_after
-from ...engine.candidates import catalogue
 from ...engine.errors import VehicleError
-from ...engine.identification import identify
+from ...engine.identification.advice_file import advisory_to_json
+from ...engine.identification.advisor import Advisory, advise_unmeasured
+from ...engine.identification.advisor import advise as advise_after
+from ...engine.identification.candidates import catalogue
+from ...engine.identification.identify import identify
+from ...engine.identification.kept_fit import fit_from_json, is_fit
+from ...engine.identification.problem import Problem
 from ...engine.json_text import read_json
-from ...engine.kept_fit import fit_from_json, is_fit
 from ...engine.manoeuvre import Manoeuvre
 from ...engine.parameters import parameter
-from ...engine.problem import Problem
 from .inputs import (
     find_manoeuvre,
     find_mapping,

@@ -9,13 +9,13 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ...engine.braking import Interval
-from ...engine.designs import Spaced
 from ...engine.errors import RideError
-from ...engine.loss import Loss
+from ...engine.identification.loss import Loss
+from ...engine.identification.sensor_model import FIT, sensor_path
 from ...engine.parameters import number_path, parameter
-from ...engine.rims_settings import RimsSettings
-from ...engine.sensor_model import FIT, sensor_path
+from ...engine.simulation.braking import Interval
+from ...engine.simulation.rims_settings import RimsSettings
+from ...engine.sweeps.designs import Spaced
 
 VALUE = "NAME=VALUE in SI units"
 LIMITS = "NAME=LOW:HIGH in SI units"

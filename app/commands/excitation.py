@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ...engine.errors import SimulationError
-from ...engine.excitation import Excitation, FreeExcitation, RimsExcitation
-from ...engine.recorded_motion import recorded_motion
-from ...engine.road_file import read_road
-from ...engine.road_specs import IsoRoad
+from ...engine.roads.road_file import read_road
+from ...engine.roads.road_specs import IsoRoad
+from ...engine.simulation.excitation import Excitation, FreeExcitation, RimsExcitation
+from ...engine.simulation.recorded_motion import recorded_motion
 from ...engine.vehicle import Vehicle
 from .arguments import rims_settings
 from .inputs import find_manoeuvre, find_mapping, read_one, read_runs, recording_files

@@ -7,12 +7,12 @@ from argparse import Namespace
 from collections.abc import Sequence
 
 from ...engine.channels import Run
-from ...engine.fit import Fit, Progress
-from ...engine.fit_file import fit_to_json, profile_to_json
-from ...engine.identification import identify as fit_to_runs
+from ...engine.identification.fit import Fit, Progress
+from ...engine.identification.fit_file import fit_to_json, profile_to_json
+from ...engine.identification.identify import identify as fit_to_runs
+from ...engine.identification.problem import Problem
+from ...engine.identification.profile import Profile, profile, require_free
 from ...engine.parameters import DAMPER_NAMES, PARAMETER_NAMES, parameter
-from ...engine.problem import Problem
-from ...engine.profile import Profile, profile, require_free
 from ...engine.vehicle import Vehicle
 from .arguments import bounds, loss, priors, rims_settings, sensors, starts, whole
 from .inputs import find_mapping, find_vehicle, read_noise, read_runs, recording_files

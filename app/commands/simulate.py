@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ...engine.bands import Bands, bands
 from ...engine.channels import Run
 from ...engine.errors import SimulationError
-from ...engine.kept_fit import KeptFit, read_fit
+from ...engine.identification.bands import Bands, bands
+from ...engine.identification.kept_fit import KeptFit, read_fit
 from ...engine.measurement import run_to_csv
-from ...engine.metrics import metrics
+from ...engine.simulation.metrics import metrics
 from .excitation import doubts, excitation, files_read, mode_of
 from .inputs import find_vehicle
 from .output import (

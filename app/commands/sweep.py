@@ -4,15 +4,15 @@ from argparse import Namespace
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from ...engine.designs import Design, FullFactorial, LatinHypercube, Sobol
 from ...engine.errors import RideError, SweepError
-from ...engine.excitation import Excitation
-from ...engine.figures import reason
 from ...engine.measurement import run_to_csv
-from ...engine.sweep import Progress, car_of
-from ...engine.sweep import sweep as sweep_cars
-from ...engine.sweep_checks import stepped_alike
-from ...engine.sweep_file import description, form_of, write_blocks
+from ...engine.simulation.excitation import Excitation
+from ...engine.sweeps.designs import Design, FullFactorial, LatinHypercube, Sobol
+from ...engine.sweeps.figures import reason
+from ...engine.sweeps.sweep import Progress, car_of
+from ...engine.sweeps.sweep import sweep as sweep_cars
+from ...engine.sweeps.sweep_checks import stepped_alike
+from ...engine.sweeps.sweep_file import description, form_of, write_blocks
 from ...engine.vehicle import Vehicle
 from ...engine.vehicle_file import write_vehicle
 from .arguments import levels, ranges, whole

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from ...engine.figures import OK, figures
-from ...engine.sweep import Block
+from ...engine.sweeps.figures import OK, figures
+from ...engine.sweeps.sweep import Block
 from .output import print_table, significant
 
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")

@@ -10,12 +10,12 @@ from typing import Any
 
 from ...engine.channels import Run
 from ...engine.errors import VehicleError
-from ...engine.fit_file import fit_to_json
+from ...engine.identification.fit_file import fit_to_json
+from ...engine.identification.sensing import corrected
+from ...engine.identification.sensor_model import readings_in
 from ...engine.json_text import read_json
 from ...engine.manoeuvre import Manoeuvre, read_manoeuvre
 from ...engine.run_notes import manoeuvre_beside
-from ...engine.sensing import corrected
-from ...engine.sensor_model import readings_in
 from ...engine.validation import (
     Case,
     Geometry,

@@ -11,11 +11,11 @@ over the seeds of errors over values (of an angle over its true value) in per ce
 import sys
 
 import numpy as np
-from ridetune.engine.advisor import advise
 from ridetune.engine.campaign import Campaign, chosen
-from ridetune.engine.expected_noise import INPUT_NOISE
-from ridetune.engine.fit import Fit
-from ridetune.engine.identification import Problem, identify
+from ridetune.engine.identification.advisor import advise
+from ridetune.engine.identification.expected_noise import INPUT_NOISE
+from ridetune.engine.identification.fit import Fit
+from ridetune.engine.identification.identify import Problem, identify
 from ridetune.engine.parameters import PARAMETERS
 from ridetune.engine.plant import ConceptPlant
 from ridetune.engine.run_notes import DEFAULT_NOISE

@@ -18,8 +18,8 @@ from ridetune.engine.conditioning.chain import condition
 from ridetune.engine.conditioning.delay import Delay
 from ridetune.engine.conditioning.suggestion import suggest
 from ridetune.engine.filters import in_band
-from ridetune.engine.identification import Problem, identify
-from ridetune.engine.rims_settings import RimsSettings
+from ridetune.engine.identification.identify import Problem, identify
+from ridetune.engine.simulation.rims_settings import RimsSettings
 from ridetune.engine.vehicle import Vehicle
 from ridetune.engine.vehicle_file import reference_vehicles
 from scipy.interpolate import CubicSpline

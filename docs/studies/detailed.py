@@ -12,12 +12,12 @@ from pathlib import Path
 
 import numpy as np
 from ridetune.engine.channels import OUTPUT_CHANNELS, Run
-from ridetune.engine.fit import Fit
-from ridetune.engine.identification import Problem, identify
+from ridetune.engine.identification.fit import Fit
+from ridetune.engine.identification.identify import Problem, identify
+from ridetune.engine.identification.residuals import Residuals
 from ridetune.engine.measurement import read_run
 from ridetune.engine.parameters import ALL_NAMES, PARAMETER_NAMES, parameter
-from ridetune.engine.residuals import Residuals
-from ridetune.engine.simulation import rims_batch, simulate_rims
+from ridetune.engine.simulation.simulate import rims_batch, simulate_rims
 from ridetune.engine.vehicle import Vehicle
 from ridetune.engine.vehicle_file import read_vehicle
 

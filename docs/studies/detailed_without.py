@@ -14,10 +14,10 @@ from ridetune.engine.channels import OUTPUT_CHANNELS, Run
 from ridetune.engine.detailed.car_file import reference_car
 from ridetune.engine.detailed.plant import DetailedPlant
 from ridetune.engine.detailed.records import BushingLaw, DetailedCar, Strut
-from ridetune.engine.identification import Problem, identify
+from ridetune.engine.identification.identify import Problem, identify
 from ridetune.engine.parameters import ALL_NAMES, PARAMETER_NAMES
 from ridetune.engine.sensors import SensorSet
-from ridetune.engine.simulation import simulate_rims
+from ridetune.engine.simulation.simulate import simulate_rims
 
 FAR = 0.9
 """m, gap of a stop that is never reached."""

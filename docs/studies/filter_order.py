@@ -12,11 +12,11 @@ from dataclasses import replace
 from ridetune.engine import filters
 from ridetune.engine.campaign import TABLE_2
 from ridetune.engine.channels import Run
-from ridetune.engine.identification import Problem, identify
+from ridetune.engine.identification.identify import Problem, identify
 from ridetune.engine.manoeuvre import reference_manoeuvres
-from ridetune.engine.rims_settings import RimsSettings
 from ridetune.engine.sensors import RECORDED
-from ridetune.engine.simulation import simulate_road
+from ridetune.engine.simulation.rims_settings import RimsSettings
+from ridetune.engine.simulation.simulate import simulate_road
 from ridetune.engine.vehicle_file import reference_vehicles
 
 ORDERS = (2, 3, 4, 6, 8, 16)

@@ -13,7 +13,7 @@ import sys
 import numpy as np
 from ridetune.engine.campaign import drive_table_2
 from ridetune.engine.channels import WHEEL_CHANNELS
-from ridetune.engine.identification import Problem, identify
+from ridetune.engine.identification.identify import Problem, identify
 from ridetune.engine.run_notes import DEFAULT_NOISE
 from ridetune.engine.vehicle_file import reference_vehicles
 

@@ -14,8 +14,8 @@ import sys
 import numpy as np
 from ridetune.engine.campaign import drive_table_2
 from ridetune.engine.channels import WHEEL_CHANNELS
-from ridetune.engine.fit import Fit
-from ridetune.engine.identification import Problem, identify
+from ridetune.engine.identification.fit import Fit
+from ridetune.engine.identification.identify import Problem, identify
 from ridetune.engine.parameters import PARAMETERS
 from ridetune.engine.vehicle_file import reference_vehicles
 

@@ -10,12 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 from ridetune.engine.channels import WHEEL_CHANNELS, Run
-from ridetune.engine.identification import Problem, identify
+from ridetune.engine.identification.identify import Problem, identify
 from ridetune.engine.manoeuvre import reference_manoeuvres
 from ridetune.engine.parameters import PARAMETERS
-from ridetune.engine.rims_settings import RimsSettings
 from ridetune.engine.sensors import RECORDED
-from ridetune.engine.simulation import simulate_road
+from ridetune.engine.simulation.rims_settings import RimsSettings
+from ridetune.engine.simulation.simulate import simulate_road
 from ridetune.engine.vehicle import Vehicle
 from ridetune.engine.vehicle_file import reference_vehicles
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from ridetune.engine.campaign import drive_table_2
 from ridetune.engine.channels import INPUT_CHANNELS
-from ridetune.engine.identification import Problem, identify
+from ridetune.engine.identification.identify import Problem, identify
 from ridetune.engine.parameters import parameter
 from ridetune.engine.run_notes import DEFAULT_NOISE
 from ridetune.engine.sensors import Sensor, SensorSet, measured

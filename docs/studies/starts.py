@@ -12,7 +12,7 @@ from collections import Counter
 import numpy as np
 from ridetune.engine.campaign import drive_table_2
 from ridetune.engine.errors import ProblemError
-from ridetune.engine.identification import Problem, identify
+from ridetune.engine.identification.identify import Problem, identify
 from ridetune.engine.parameters import PARAMETERS, default_bounds
 from ridetune.engine.run_notes import DEFAULT_NOISE
 from ridetune.engine.vehicle_file import reference_vehicles

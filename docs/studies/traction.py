@@ -7,9 +7,9 @@ of Table 2, sampled every 5 ms. Prints the table of docs/identification.md.
 """
 
 from ridetune.engine.campaign import drive_table_2
-from ridetune.engine.identification import Problem, identify
+from ridetune.engine.identification.identify import Problem, identify
 from ridetune.engine.parameters import PARAMETERS
-from ridetune.engine.rims_settings import RimsSettings
+from ridetune.engine.simulation.rims_settings import RimsSettings
 from ridetune.engine.vehicle_file import reference_vehicles
 
 

@@ -21,7 +21,7 @@ from ..demand import Demand
 from ..errors import Cancelled, SimulationDiverged, SimulationError
 from ..frames import CORNERS, Corner
 from ..manoeuvre import Manoeuvre
-from ..output_channels import Points
+from ..simulation.output_channels import Points
 from .builder import Model
 from .equilibrium import settle
 from .ground import Ground, patch_road

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 
 from ..frames import Corner, side_of
-from ..road import LEFT, RIGHT, Road
+from ..roads.road import LEFT, RIGHT, Road
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..channels import Run
-from ..output_channels import Points
+from ..simulation.output_channels import Points
 from .builder import Model
 from .pose import point, point_acceleration, point_velocity, rotation, spin
 

@@ -8,8 +8,8 @@ from ..channels import CHANNELS, RAW_CHANNELS
 from ..frames import CORNERS
 from ..json_record import record_to_json
 from ..manoeuvre import Manoeuvre
-from ..output_channels import DEFAULT_POINTS, Points
 from ..plant import Asked, Driven, Told
+from ..simulation.output_channels import DEFAULT_POINTS, Points
 from ..vehicle import Vehicle
 from .concept import known_vehicle
 from .driving import STEP, DetailedRunDiverged, drive

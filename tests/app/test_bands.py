@@ -7,11 +7,11 @@ import pytest
 from numpy.testing import assert_allclose
 from ridetune.app.cli import main
 from ridetune.app.settings import Limits, Settings
-from ridetune.engine.bands import bands
-from ridetune.engine.excitation import FreeExcitation
-from ridetune.engine.kept_fit import read_fit
+from ridetune.engine.identification.bands import bands
+from ridetune.engine.identification.kept_fit import read_fit
 from ridetune.engine.manoeuvre import reference_manoeuvres
 from ridetune.engine.measurement import read_run
+from ridetune.engine.simulation.excitation import FreeExcitation
 from ridetune.engine.vehicle_file import reference_vehicles, vehicle_to_json
 
 from .conftest import SAMPLES, Visitor, open_client

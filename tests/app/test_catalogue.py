@@ -8,9 +8,9 @@ import pytest
 from ridetune.engine.channels import CHANNELS
 from ridetune.engine.manoeuvre import manoeuvre_from_json, reference_manoeuvres
 from ridetune.engine.parameters import ALL_NAMES
-from ridetune.engine.rims_settings import RimsSettings
 from ridetune.engine.run_notes import DEFAULT_NOISE
 from ridetune.engine.sensor_file import sensors_from_json
+from ridetune.engine.simulation.rims_settings import RimsSettings
 from ridetune.engine.vehicle_file import reference_vehicles, vehicle_from_json
 
 

@@ -15,10 +15,10 @@ from pyarrow import feather, parquet
 from ridetune.app.cli import main
 from ridetune.app.commands import watch as watch_module
 from ridetune.app.commands.sweep import _line
-from ridetune.engine.designs import LatinHypercube, Sobol
 from ridetune.engine.measurement import read_run, write_run
-from ridetune.engine.metrics import metrics
-from ridetune.engine.sweep import Progress
+from ridetune.engine.simulation.metrics import metrics
+from ridetune.engine.sweeps.designs import LatinHypercube, Sobol
+from ridetune.engine.sweeps.sweep import Progress
 from ridetune.engine.vehicle_file import read_vehicle, reference_vehicles
 
 from .test_cli import PROGRAM, refused

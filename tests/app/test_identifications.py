@@ -14,8 +14,8 @@ from ridetune.app.identification_job import as_asked, check_budget
 from ridetune.app.jobs import digest
 from ridetune.app.schemas import IdentificationRequest
 from ridetune.app.settings import Limits, Settings
+from ridetune.engine.identification.multistart import fits_of
 from ridetune.engine.measurement import read_run, run_to_csv
-from ridetune.engine.multistart import fits_of
 from ridetune.engine.parameters import PARAMETER_NAMES
 from ridetune.engine.vehicle_file import read_vehicle, vehicle_to_json
 

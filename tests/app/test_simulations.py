@@ -15,8 +15,8 @@ from ridetune.app.warmup import WarmUp
 from ridetune.engine.errors import SimulationError
 from ridetune.engine.manoeuvre import manoeuvre_from_json, reference_manoeuvres
 from ridetune.engine.measurement import read_run
-from ridetune.engine.rims_settings import RimsSettings
-from ridetune.engine.simulation import simulate_rims, simulate_road
+from ridetune.engine.simulation.rims_settings import RimsSettings
+from ridetune.engine.simulation.simulate import simulate_rims, simulate_road
 from ridetune.engine.vehicle_file import reference_vehicles, vehicle_from_json, vehicle_to_json
 
 from .conftest import ADDRESS, SAMPLES, Visitor, open_client

@@ -10,12 +10,12 @@ from pyarrow import feather, parquet
 from ridetune.app.schemas import SweepRequest
 from ridetune.app.settings import Limits, Settings
 from ridetune.app.sweep_job import most_bytes
-from ridetune.engine.designs import Sobol
-from ridetune.engine.excitation import FreeExcitation
-from ridetune.engine.figures import OK, figures
 from ridetune.engine.manoeuvre import reference_manoeuvres
-from ridetune.engine.sweep import columns
-from ridetune.engine.sweep import sweep as sweep_through
+from ridetune.engine.simulation.excitation import FreeExcitation
+from ridetune.engine.sweeps.designs import Sobol
+from ridetune.engine.sweeps.figures import OK, figures
+from ridetune.engine.sweeps.sweep import columns
+from ridetune.engine.sweeps.sweep import sweep as sweep_through
 from ridetune.engine.vehicle_file import reference_vehicles, vehicle_to_json
 
 from .conftest import Visitor, open_client

@@ -21,7 +21,7 @@ from ridetune.engine.plant import ConceptPlant, Driven
 from ridetune.engine.recording_files import files_of, files_of_car, names_of
 from ridetune.engine.run_notes import parse_notes
 from ridetune.engine.sensors import RECORDED, Sensor, SensorSet
-from ridetune.engine.simulation import simulate_road
+from ridetune.engine.simulation.simulate import simulate_road
 from ridetune.engine.vehicle_file import reference_vehicles, vehicle_from_json
 
 CAR = reference_vehicles()["paper"]

@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 from llvmlite.binding import get_host_cpu_features
 from ridetune import engine
-from ridetune.engine.car_rows import car_row
-from ridetune.engine.integration import free_states, rims_states
 from ridetune.engine.jit import ARITHMETIC
 from ridetune.engine.kernels.integrate import integrate_free, integrate_rims
 from ridetune.engine.kernels.lanes import BATCH
 from ridetune.engine.manoeuvre import reference_manoeuvres
-from ridetune.engine.rims import prepare
-from ridetune.engine.simulation import simulate_posts
-from ridetune.engine.stepping import prepare_free
+from ridetune.engine.simulation.car_rows import car_row
+from ridetune.engine.simulation.integration import free_states, rims_states
+from ridetune.engine.simulation.rims import prepare
+from ridetune.engine.simulation.simulate import simulate_posts
+from ridetune.engine.simulation.stepping import prepare_free
 
 from ..factories import paper_vehicle
 
@@ -56,10 +56,10 @@ def drive_a_batch():
 
 SPRING_FORCE = """
 import numpy as np
-from ridetune.engine.car_rows import car_row
-from ridetune.engine.integration import free_outputs
-from ridetune.engine.output_channels import corner_output
-from ridetune.engine.road import Road
+from ridetune.engine.simulation.car_rows import car_row
+from ridetune.engine.simulation.integration import free_outputs
+from ridetune.engine.simulation.output_channels import corner_output
+from ridetune.engine.roads.road import Road
 from ridetune.engine.vehicle_file import reference_vehicles
 
 states = np.zeros((1, 16))

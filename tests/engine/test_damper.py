@@ -5,13 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from ridetune.engine.car_rows import car_row, car_rows
 from ridetune.engine.errors import SimulationError
 from ridetune.engine.frames import CORNERS
 from ridetune.engine.manoeuvre import reference_manoeuvres
-from ridetune.engine.rims import prepare
-from ridetune.engine.simulation import rims_batch, simulate_posts, simulate_road
-from ridetune.engine.stability import check_free_step, is_stable, rims_eigenvalues, road_eigenvalues
+from ridetune.engine.simulation.car_rows import car_row, car_rows
+from ridetune.engine.simulation.rims import prepare
+from ridetune.engine.simulation.simulate import rims_batch, simulate_posts, simulate_road
+from ridetune.engine.simulation.stability import (
+    check_free_step,
+    is_stable,
+    rims_eigenvalues,
+    road_eigenvalues,
+)
 
 from ..factories import DAMPERS, paper_vehicle, random_vehicle, with_random_dampers
 

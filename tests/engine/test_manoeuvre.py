@@ -11,7 +11,6 @@ import pytest
 from numpy.testing import assert_allclose
 from ridetune.engine.demand import point_mass_motion
 from ridetune.engine.errors import ManoeuvreError, RoadError
-from ridetune.engine.iso8608 import iso_road
 from ridetune.engine.manoeuvre import (
     manoeuvre_from_json,
     manoeuvre_to_json,
@@ -19,7 +18,8 @@ from ridetune.engine.manoeuvre import (
     reference_manoeuvres,
 )
 from ridetune.engine.parameters import PARAMETER_NAMES
-from ridetune.engine.road import LEFT, RIGHT
+from ridetune.engine.roads.iso8608 import iso_road
+from ridetune.engine.roads.road import LEFT, RIGHT
 from ridetune.engine.torque_laws import DriveTable
 from ridetune.engine.vehicle import Brakes
 from scipy import signal

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from ridetune.engine.channels import OUTPUT_CHANNELS, WHEEL_CHANNELS, channel
 from ridetune.engine.manoeuvre import reference_manoeuvres
-from ridetune.engine.simulation import simulate_posts, simulate_road
+from ridetune.engine.simulation.simulate import simulate_posts, simulate_road
 from ridetune.engine.spikes import despiked, spikes
 
 from ..factories import paper_vehicle

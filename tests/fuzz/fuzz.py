@@ -43,7 +43,7 @@ from ridetune.engine.mapping.reading import mapped_run
 from ridetune.engine.mapping.signs import check_signs
 from ridetune.engine.mapping.survey import survey
 from ridetune.engine.measurement import named_run
-from ridetune.engine.road_file import crg_road
+from ridetune.engine.roads.road_file import crg_road
 
 from tests import files_of_kinds
 from tests.fuzz import texts

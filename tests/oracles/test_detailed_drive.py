@@ -8,7 +8,7 @@ from ridetune.engine.detailed.car_file import reference_car
 from ridetune.engine.detailed.driving import drive
 from ridetune.engine.detailed.equilibrium import settle
 from ridetune.engine.manoeuvre import Manoeuvre
-from ridetune.engine.road_specs import IsoRoad, Section
+from ridetune.engine.roads.road_specs import IsoRoad, Section
 from ridetune.engine.torque_laws import BrakeTable, DriveTable
 
 from .detailed_drive import DetailedDrive

@@ -13,7 +13,7 @@ from ridetune.app.bench.modes import relative_error
 from ridetune.app.bench.mujoco_peer import MujocoCar
 from ridetune.app.bench.peers import INSTALL
 from ridetune.engine.manoeuvre import Manoeuvre
-from ridetune.engine.road import Road
+from ridetune.engine.roads.road import Road
 from ridetune.engine.torque_laws import Deceleration, DriveTable
 
 from ...factories import random_vehicle

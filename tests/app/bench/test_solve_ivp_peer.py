@@ -8,11 +8,11 @@ from numpy.testing import assert_allclose
 from ridetune.app.bench.modes import relative_error, the_car
 from ridetune.app.bench.right_hand_side import rate_of
 from ridetune.app.bench.solve_ivp_peer import ABSOLUTE, RELATIVE, cheapest
-from ridetune.engine.car_rows import car_row
 from ridetune.engine.demand import Demand, PiecewiseLinear
-from ridetune.engine.integration import free_states
-from ridetune.engine.road import Road
-from ridetune.engine.stepping import prepare_free
+from ridetune.engine.roads.road import Road
+from ridetune.engine.simulation.car_rows import car_row
+from ridetune.engine.simulation.integration import free_states
+from ridetune.engine.simulation.stepping import prepare_free
 
 from ...factories import random_road_state, random_vehicle
 from ...oracles.mujoco_car import MujocoCar

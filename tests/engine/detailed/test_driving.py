@@ -16,8 +16,8 @@ from ridetune.engine.detailed.pose import point
 from ridetune.engine.errors import Cancelled, SimulationError
 from ridetune.engine.frames import CORNERS, GRAVITY
 from ridetune.engine.manoeuvre import Manoeuvre, reference_manoeuvres
-from ridetune.engine.road import LEFT
-from ridetune.engine.road_specs import BumpRoad
+from ridetune.engine.roads.road import LEFT
+from ridetune.engine.roads.road_specs import BumpRoad
 from ridetune.engine.torque_laws import Deceleration, DriveTable
 
 CAR = reference_car()

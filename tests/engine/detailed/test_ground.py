@@ -10,8 +10,8 @@ from ridetune.engine.detailed.equilibrium import coordinates, settle, static_set
 from ridetune.engine.detailed.ground import Ground, patch_road
 from ridetune.engine.frames import CORNERS
 from ridetune.engine.manoeuvre import Manoeuvre
-from ridetune.engine.road import LEFT, RIGHT, Road
-from ridetune.engine.road_specs import PotholeRoad
+from ridetune.engine.roads.road import LEFT, RIGHT, Road
+from ridetune.engine.roads.road_specs import PotholeRoad
 
 PATCH = 0.12
 

@@ -1,0 +1,339 @@
+"""What a fit should tell about its runs: wrong signs and units, channels the model cannot follow.
+
+All functions compare one measured channel with what its sensor reads of the model and return a
+sentence that names run and channel, or None. The model at the start values is as telling as the
+fitted one: a fit to a record of the wrong sign bends the car until the two look alike.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..simulation.simulate import fit_percent
+from ..spikes import despiked
+from ..units import after_number, in_percent
+from .compared_runs import ComparedRun
+from .fit import CombinationEstimate, Estimate, FittedRun, Minimum, SensorEstimate
+from .problem import Problem
+from .uncertainty import Uncertainty
+
+Array = NDArray[np.float64]
+Histories = Mapping[str, Mapping[str, Array]]
+"""(samples,) by run and channel."""
+
+OPPOSITE = -0.5
+"""Correlation with the model below which a channel counts as turned over."""
+
+EXCHANGED = {
+    "chassis.pitch": ", unless it is the front and rear wheels whose columns are exchanged",
+    "chassis.roll": ", unless it is the left and right wheels whose columns are exchanged",
+}
+"""What turns a channel over as its own sign does."""
+
+ALIKE = 5.0
+"""Factor between measured and model amplitude up to which their signs are compared."""
+
+STANDING = {"chassis.z": 0.1, "chassis.pitch": 0.06, "chassis.roll": 0.06}
+"""Standard deviation (m, rad) beyond which a model has fallen over and is no witness."""
+
+LEAST_MOTION = 1e-4
+"""Share of it below which a model does not move: 10 um, or 0.3 thousandths of a degree."""
+
+POOR_FIT = 50.0
+"""Fit percent below which a channel is reported, unless noise alone explains it."""
+
+NOISE_EXPLAINS = 2.0
+"""Residuals up to this many times the stated noise are noise."""
+
+DEGREES = 180.0 / math.pi
+
+UNIT_RATIOS = {
+    "chassis.z": ((1e3, 3.0, "mm", "m"), (1e-3, 3.0, "m", "mm")),
+    "chassis.pitch": ((DEGREES, 2.5, "deg", "rad"), (1 / DEGREES, 2.5, "rad", "deg")),
+    "chassis.roll": ((DEGREES, 2.5, "deg", "rad"), (1 / DEGREES, 2.5, "rad", "deg")),
+}
+"""By channel: the ratio of measured to model amplitude that a mistaken unit makes, the factor
+around it that counts, the unit of the numbers and the unit the header claims."""
+
+FEW_OUTLIERS, MANY_OUTLIERS = 0.005, 0.2
+"""Shares of a channel beyond the loss's scale: from the first they are more than the noise's own
+(0.3 % beyond three), from the second no outliers."""
+
+AS_GOOD = 1.02
+"""Times the lowest cost up to which another minimum fits about as well: its residuals' rms is a
+hundredth larger."""
+
+UNEXCITED = 0.5
+"""A parameter is unexcited when, even with all others known, its 95 % half-width would exceed
+this share of its scale."""
+
+TOLD_APART = 0.9
+"""Correlation from which an undetermined parameter is said to be confused with another."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """What is probably wrong with a channel; `factor` of its readings, where that would mend it."""
+
+    sentence: str
+    factor: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelFaults:
+    """All that is probably wrong with a run's channel; `beside` tells what else it may be."""
+
+    found: tuple[Fault, ...]
+    beside: list[str] = field(default_factory=list)
+
+    @property
+    def sentences(self) -> list[str]:
+        """Them all, for a person."""
+        return [*(one.sentence for one in self.found), *self.beside]
+
+
+def correlation(measured: Array, model: Array) -> float:
+    """Correlation of the two histories about their means; 0 when one of them never moves."""
+    one, other = measured - np.mean(measured), model - np.mean(model)
+    size = float(np.linalg.norm(one) * np.linalg.norm(other))
+    return float(one @ other) / size if size > 0.0 else 0.0
+
+
+def _amplitude_ratio(channel: str, measured: Array, model: Array) -> float:
+    """Measured over model amplitude; 0 for a model that never moves or has fallen over."""
+    of_measured, of_model = (float(np.std(despiked(one))) for one in (measured, model))
+    moves = LEAST_MOTION * STANDING[channel] < of_model < STANDING[channel]
+    return of_measured / of_model if moves else 0.0
+
+
+def wrong_sign(
+    run: str, channel: str, measured: Array, start: Array, fitted: Array
+) -> Fault | None:
+    """A channel that runs against the model, at the start values or after the fit.
+
+    A model that moves much more or less than the channel is no witness.
+    """
+    for model, when in ((start, "at the start values"), (fitted, "after the fit")):
+        opposed = correlation(measured, model)
+        if opposed < OPPOSITE and 1.0 / ALIKE < _amplitude_ratio(channel, measured, model) < ALIKE:
+            return Fault(
+                f"{channel} of run {run} runs against the model (correlation {opposed:.2f} {when});"
+                f" its sign is probably wrong: multiply it by -1{EXCHANGED.get(channel, '')}.",
+                -1.0,
+            )
+    return None
+
+
+def wrong_unit(run: str, channel: str, measured: Array, start: Array) -> Fault | None:
+    """A channel whose amplitude is a unit's factor away from the model's at the start values."""
+    ratio = _amplitude_ratio(channel, measured, start)
+    for expected, spread, numbers, header in UNIT_RATIOS[channel]:
+        if expected / spread < ratio < expected * spread:
+            return Fault(
+                f"{channel} of run {run} moves {ratio:.3g} times as much as the model; its numbers "
+                f"may be in {numbers} under a header that says {header}: correct the header.",
+                expected,
+            )
+    return None
+
+
+def dead_sensor(
+    run: str, channel: str, measured: Array, model: Array, noise: float
+) -> Fault | None:
+    """A channel that never moves although the model at the start values does, beyond its noise."""
+    if np.ptp(measured) > 0.0 or float(np.std(model)) <= NOISE_EXPLAINS * noise:
+        return None
+    return Fault(
+        f"{channel} of run {run} never moves while the model does; its sensor was probably dead: "
+        "leave the channel out."
+    )
+
+
+def poor_fit(run: str, channel: str, measured: Array, fitted: Array, noise: float) -> str | None:
+    """A channel which the fitted model follows badly, for other reasons than its noise."""
+    percent = fit_percent(measured, fitted)
+    misfit = float(np.sqrt(np.mean((measured - fitted) ** 2)))
+    if percent >= POOR_FIT or misfit <= NOISE_EXPLAINS * noise:
+        return None
+    return (
+        f"The model follows {channel} of run {run} poorly (fit {percent:.0f} %); check the "
+        "channel, the car's known data and the start values."
+    )
+
+
+def channel_faults(
+    runs: Sequence[ComparedRun], start: Histories, fitted: Histories
+) -> dict[tuple[str, str], ChannelFaults]:
+    """By run and channel, a sign, unit or sensor that is probably wrong."""
+    found: dict[tuple[str, str], ChannelFaults] = {}
+    for seen in runs:
+        opposed = []
+        for channel, measured in seen.measured.items():
+            before, after = start[seen.name][channel], fitted[seen.name][channel]
+            sign = wrong_sign(seen.name, channel, measured, before, after)
+            unit = wrong_unit(seen.name, channel, measured, before)
+            opposed += [channel] if sign else []
+            dead = dead_sensor(seen.name, channel, measured, before, seen.noise[channel])
+            if sign or unit or dead:
+                faults = tuple(one for one in (sign, unit, dead) if one)
+                found[seen.name, channel] = ChannelFaults(faults)
+        if len(opposed) > 1:
+            found[seen.name, opposed[-1]].beside.append(
+                f"Since {' and '.join(opposed)} of run {seen.name} run against the model together, "
+                "it may rather be the wheel.*.z whose sign is wrong."
+            )
+    return found
+
+
+def poor_fits(runs: Sequence[ComparedRun], fitted: Histories) -> list[str]:
+    """Sentences on channels followed badly."""
+    found = (
+        poor_fit(seen.name, channel, measured, fitted[seen.name][channel], seen.noise[channel])
+        for seen in runs
+        for channel, measured in seen.measured.items()
+    )
+    return [sentence for sentence in found if sentence]
+
+
+def hardly_moving(runs: Sequence[ComparedRun]) -> list[str]:
+    """Sentences on runs that move little more than their noise."""
+    return [
+        f"In run {seen.name} {', '.join(seen.measured)} move hardly more than their noise; it says "
+        "little of the car, so add a livelier run."
+        for seen in runs
+        if all(
+            float(np.std(values)) < NOISE_EXPLAINS * seen.noise[channel]
+            for channel, values in seen.measured.items()
+        )
+    ]
+
+
+def outlier_findings(problem: Problem, runs: Sequence[FittedRun]) -> list[str]:
+    """Sentences on what a loss counts for less: a few outliers, or most of a channel."""
+    loss, found = problem.loss, []
+    for run in runs:
+        for channel, count in run.discounted.items():
+            share = count / run.samples
+            if share > MANY_OUTLIERS:
+                found.append(
+                    f"{in_percent(share)} of {channel} of run {run.name} lie beyond "
+                    f"{loss.scale:g} noises of the model, too many for outliers: the {loss.name} "
+                    "loss mends no misfit, so check the noise and the car's known data."
+                )
+            elif share > FEW_OUTLIERS:
+                found.append(
+                    f"{count} of {run.samples} samples of {channel} of run {run.name} lie beyond "
+                    f"{loss.scale:g} noises of the model; the {loss.name} loss counts them for "
+                    "less."
+                )
+    return found
+
+
+def minima_findings(minima: Sequence[Minimum]) -> list[str]:
+    """Where the start values alone would have led, and minima that fit as well as the best."""
+    best, *others = minima
+    found = []
+    led = next(one for one in minima if one.from_start)
+    if led is not best:
+        found.append(
+            f"From the start values alone the fit would have ended at a cost of {led.cost:.5g} in "
+            f"place of {best.cost:.5g}."
+        )
+    for other in others:
+        if other.cost < AS_GOOD * best.cost:
+            apart = max(best.parameters, key=lambda name: _ratio(best, other, name))
+            found.append(
+                f"Another minimum fits nearly as well (cost {other.cost:.5g} against "
+                f"{best.cost:.5g}): {apart} is {other.parameters[apart]:.4g} there in place of "
+                f"{best.parameters[apart]:.4g}; add a run that tells them apart."
+            )
+    return found
+
+
+def _ratio(one: Minimum, other: Minimum, name: str) -> float:
+    """How far two minima are apart in a parameter, relative."""
+    first, second = one.parameters[name], other.parameters[name]
+    return abs(first - second) / max(abs(first), abs(second), 1e-9)
+
+
+def bound_findings(estimates: Sequence[Estimate]) -> list[str]:
+    """What is at a bound."""
+    return [_at_bound(one) for one in estimates if one.at_bound]
+
+
+def undetermined_findings(
+    estimates: Sequence[Estimate],
+    errors: Uncertainty,
+    combinations: Sequence[CombinationEstimate] = (),
+) -> list[str]:
+    """What the runs do not determine, grouped by what can be done about it.
+
+    errors : of all estimates, in their order
+    combinations : those that the verdict tells of; a pair in one of them is not told again
+    """
+    unexcited, confused, unknown, sensors = [], [], [], []
+    for k, one in enumerate(estimates):
+        if one.at_bound or one.determined != "no":
+            continue
+        partner = _partner(errors, k)
+        if not _excited(errors, k):
+            unexcited.append(one.title)
+        elif partner is None:
+            (sensors if isinstance(one, SensorEstimate) else unknown).append(one.title)
+        elif sorted([k, partner]) not in confused:
+            confused.append(sorted([k, partner]))
+    found = []
+    if unexcited:
+        remedy = "fix it" if len(unexcited) == 1 else "fix them"
+        found.append(
+            f"The runs do not excite {', '.join(unexcited)}; {remedy} or add a run that does."
+        )
+    for first, second in ((estimates[one], estimates[other]) for one, other in confused):
+        if not any({first.name, second.name} <= {*one.of} for one in combinations):
+            found.append(
+                f"The runs hardly tell {first.title} from {second.title}; fix one of them or add a "
+                "run that moves them differently."
+            )
+    if unknown:
+        found.append(
+            f"The runs leave {', '.join(unknown)} with a 95 % interval wider than half the value; "
+            "fix some of the parameters or measure more."
+        )
+    if sensors:
+        found.append(
+            f"The runs leave {', '.join(sensors)} open; fix what is known of the sensors or measure"
+            " more."
+        )
+    return found
+
+
+def _at_bound(one: Estimate) -> str:
+    at_lower = one.value - one.lower < one.upper - one.value
+    side, bound = ("lower", one.lower) if at_lower else ("upper", one.upper)
+    said = f"{one.title} is at its {side} bound, {bound:.4g}{after_number(one.unit)}"
+    if isinstance(one, SensorEstimate):
+        return f"{said}; check the sensor, or the car's known data."
+    if one.name.endswith("knee_speed") and not at_lower:
+        return (
+            f"{said}: the runs show no knee, as"
+            " if the damper kept its slopes at every speed; fix it or add a rougher run."
+        )
+    return f"{said}; widen the bound or fix the parameter."
+
+
+def _excited(errors: Uncertainty, k: int) -> bool:
+    """Whether the runs would determine the parameter if all others were known."""
+    return bool(errors.quantile * errors.alone[k] < UNEXCITED)
+
+
+def _partner(errors: Uncertainty, k: int) -> int | None:
+    """The parameter with which one is confused; those in an undetermined direction first."""
+    strength = np.abs(np.nan_to_num(errors.correlation[k], nan=0.0))
+    if np.isinf(errors.std_error[k]):
+        strength = np.where(np.isinf(errors.std_error), 1.0, 0.0)
+    strength[k] = 0.0
+    nearest = int(np.argmax(strength))
+    return nearest if strength[nearest] > TOLD_APART else None

@@ -1,0 +1,199 @@
+"""What the runs of a fit determine: parameters, and combinations where the parameters are not.
+
+A fit may follow its runs perfectly with wrong parameters, since directions in which the parameters
+move together leave the model as it is. The errors of any quantity q(x) of the car follow from the
+covariance C of the search's variables x,
+
+    s_q^2 = g^T C g,    g = dq/dx,
+
+and are infinite where g has a part in a direction that the runs do not determine. A combination is
+told where the runs hold it better than they hold the parameters it is made of: its error is below
+PART_OF_APART of what these errors would give were they independent, sqrt(sum (g_k s_k)^2).
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..parameters import parameter
+from ..units import after_number, in_percent
+from ..vehicle import Vehicle
+from .combinations import COMBINATIONS, Combination
+from .fit import CombinationEstimate, Direction, ParameterEstimate, Verdict, determined
+from .uncertainty import NAMED, Uncertainty
+from .variables import moved
+
+Array = NDArray[np.float64]
+
+PART_OF_APART = 1.0 / 3.0
+"""Two parameters of the same error must be correlated by 0.89 for their ratio to be so good."""
+
+STEP = 1e-4
+"""Of the central differences that make g; their error is of order STEP^2."""
+
+ALONG = 0.95
+"""Cosine of the angle between an axis and the gradient of a combination that it stands for."""
+
+ORDER = ("yes", "weakly", "no")
+
+
+def verdict(
+    estimates: Sequence[ParameterEstimate], errors: Uncertainty, vehicle: Vehicle
+) -> Verdict:
+    """The verdict on a fit that converged.
+
+    errors : of the search's variables;  vehicle : at the solution
+    """
+    classes = by_class(estimates)
+    names = [one.name for one in estimates]
+    gradients = {
+        one.name: _gradient(one, estimates, vehicle)
+        for one in COMBINATIONS
+        if one.acts(vehicle) and sum(name in names for name in one.of) > 1
+    }
+    combined = [
+        estimate
+        for one in COMBINATIONS
+        if one.name in gradients
+        and (estimate := _held_together(one, gradients[one.name], estimates, errors, vehicle))
+    ]
+    return Verdict(
+        parameters=classes,
+        combinations=tuple(combined),
+        directions=tuple(_directions(names, errors, gradients)),
+        sentences=(
+            *_of_parameters(classes),
+            *(_of_combination(one, classes["yes"]) for one in combined),
+        ),
+    )
+
+
+def without_verdict(estimates: Sequence[ParameterEstimate]) -> Verdict:
+    """That on a fit whose errors mean nothing."""
+    return Verdict(by_class(estimates), (), (), ())
+
+
+def by_class(estimates: Sequence[ParameterEstimate]) -> dict[str, tuple[str, ...]]:
+    """The parameters' names by how well they are determined."""
+    return {word: tuple(one.name for one in estimates if one.determined == word) for word in ORDER}
+
+
+def _gradient(one: Combination, estimates: Sequence[ParameterEstimate], vehicle: Vehicle) -> Array:
+    """dq/dx, (n,); d ln q/dx of a quantity that is never negative, 0 where it is 0."""
+    if not one.signed and one.value(vehicle) <= 0.0:
+        return np.zeros(len(estimates))
+    gradient = np.zeros(len(estimates))
+    for k, of in enumerate(estimates):
+        if of.name in one.of:
+            ends = [_moved(one, of, vehicle, way * STEP) for way in (1.0, -1.0)]
+            gradient[k] = (ends[0] - ends[1]) / (2.0 * STEP)
+    return gradient
+
+
+def _moved(one: Combination, of: ParameterEstimate, vehicle: Vehicle, change: float) -> float:
+    """q, or its logarithm, with a parameter's variable changed by so much, bounds aside."""
+    value = of.free.moved(of.value, change)
+    found = one.value(vehicle.varied({of.name: np.array(value)}))
+    return float(found if one.signed else np.log(found))
+
+
+def _held_together(
+    one: Combination,
+    gradient: Array,
+    estimates: Sequence[ParameterEstimate],
+    errors: Uncertainty,
+    vehicle: Vehicle,
+) -> CombinationEstimate | None:
+    """The combination, if the runs hold it better than what it is made of."""
+    # A parameter may have no part in it here, as the arm of a bar without a rate.
+    members = [k for k, slope in enumerate(gradient.tolist()) if slope]
+    if not members:
+        return None
+    estimate = _estimate(one, gradient, errors, vehicle)
+    apart = float(np.linalg.norm(gradient[members] * errors.std_error[members]))
+    worst = max(ORDER.index(estimates[k].determined) for k in members)
+    better = ORDER.index(estimate.determined) < worst
+    return estimate if better and errors.error_of(gradient) < PART_OF_APART * apart else None
+
+
+def _estimate(
+    one: Combination, gradient: Array, errors: Uncertainty, vehicle: Vehicle
+) -> CombinationEstimate:
+    value, error = one.value(vehicle), errors.error_of(gradient)
+    half_width = errors.quantile * error
+    low, high = (
+        moved(value, change, logarithmic=not one.signed) for change in (-half_width, half_width)
+    )
+    return CombinationEstimate(
+        name=one.name,
+        symbol=one.symbol,
+        label=one.label,
+        unit=one.unit,
+        of=one.of,
+        value=value,
+        std_error=error if one.signed else error * value,
+        confidence_interval=(low, high),
+        determined=determined(max(abs(value), one.matters), 0.5 * (high - low)),
+    )
+
+
+def _directions(
+    names: Sequence[str], errors: Uncertainty, gradients: Mapping[str, Array]
+) -> list[Direction]:
+    """Unknown directions, then the covariance's axes by their length."""
+    squares, axes = np.linalg.eigh(errors.covariance)
+    lengths = errors.quantile * np.sqrt(np.maximum(squares, 0.0))
+    known = range(len(squares) - 1, len(errors.unknown) - 1, -1)
+    found = [(math.inf, row) for row in errors.unknown]
+    found += [(float(lengths[k]), axes[:, k]) for k in known]
+    return [
+        Direction(length, _parts(names, axis), _along(axis, gradients)) for length, axis in found
+    ]
+
+
+def _parts(names: Sequence[str], axis: Array) -> dict[str, float]:
+    """The loud components, the loudest first and positive."""
+    order: list[int] = np.argsort(-np.abs(axis)).tolist()
+    sign = float(np.sign(axis[order[0]]))
+    return {names[k]: sign * float(axis[k]) for k in order if abs(float(axis[k])) >= NAMED}
+
+
+def _along(axis: Array, gradients: Mapping[str, Array]) -> str | None:
+    """Name of the combination whose gradient lies along an axis."""
+    along = {
+        name: abs(float(axis @ gradient)) / float(np.linalg.norm(gradient))
+        for name, gradient in gradients.items()
+        if np.any(gradient)
+    }
+    best = max(along, key=lambda name: along[name], default=None)
+    return best if best is not None and along[best] > ALONG else None
+
+
+def _of_parameters(classes: Mapping[str, Sequence[str]]) -> list[str]:
+    wording = {
+        "yes": "Determined to better than 15 %",
+        "weakly": "Determined weakly, to between 15 and 50 %",
+        "no": "Not determined by these runs",
+    }
+    return [
+        f"{said}: {', '.join(parameter(name).symbol for name in classes[word])}."
+        for word, said in wording.items()
+        if classes[word]
+    ]
+
+
+def _of_combination(one: CombinationEstimate, known: Sequence[str]) -> str:
+    apart = [parameter(name).symbol for name in one.of if name not in known]
+    low, high = one.confidence_interval
+    half_width, unit = 0.5 * (high - low), after_number(one.unit)
+    if low < 0.0 < high:
+        told = f"{one.value:.4g} ± {half_width:.2g}{unit}"
+    else:
+        told = f"{one.value:.4g}{unit} to {in_percent(half_width / abs(one.value))}"
+    are = "are determined only together" if len(apart) > 1 else "is determined better"
+    return (
+        f"{', '.join(apart[:-1])}{' and ' if apart[1:] else ''}{apart[-1]} {are}, as {one.symbol},"
+        f" the {one.label[0].lower()}{one.label[1:]}: {told}."
+    )

@@ -1,0 +1,1 @@
+"""Roads: of shapes, of ISO 8608 and from files."""

@@ -1,0 +1,1 @@
+"""Drives cars along recorded rims, over roads and on posts."""
