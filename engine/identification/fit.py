@@ -32,8 +32,7 @@ class Outcome(StrEnum):
     DETERMINED = "The fit converged and the runs determine every free parameter."
     WEAKLY = "The fit converged; the runs determine some of the free parameters only weakly."
     AT_BOUND = (
-        "The fit converged at a bound of the search; widen it, fix the parameter that is there, or "
-        "check the runs."
+        "The fit converged at a bound of the search; the warnings name it and say what to do."
     )
     UNDETERMINED = (
         "The fit converged, but the runs do not determine every free parameter; fix one or "

@@ -259,9 +259,15 @@ def _ratio(one: Minimum, other: Minimum, name: str) -> float:
     return abs(first - second) / max(abs(first), abs(second), 1e-9)
 
 
-def bound_findings(estimates: Sequence[Estimate]) -> list[str]:
-    """What is at a bound."""
-    return [_at_bound(one) for one in estimates if one.at_bound]
+def bound_findings(
+    estimates: Sequence[Estimate], combinations: Sequence[CombinationEstimate] = ()
+) -> list[str]:
+    """What is at a bound.
+
+    combinations : those that the verdict tells of; what is known in one of them alone would drift
+        to any bound
+    """
+    return [_at_bound(one, combinations) for one in estimates if one.at_bound]
 
 
 def undetermined_findings(
@@ -310,7 +316,7 @@ def undetermined_findings(
     return found
 
 
-def _at_bound(one: Estimate) -> str:
+def _at_bound(one: Estimate, combinations: Sequence[CombinationEstimate]) -> str:
     at_lower = one.value - one.lower < one.upper - one.value
     side, bound = ("lower", one.lower) if at_lower else ("upper", one.upper)
     said = f"{one.title} is at its {side} bound, {bound:.4g}{after_number(one.unit)}"
@@ -321,6 +327,14 @@ def _at_bound(one: Estimate) -> str:
             f"{said}: the runs show no knee, as"
             " if the damper kept its slopes at every speed; fix it or add a rougher run."
         )
+    for combination in combinations:
+        others = [name for name in combination.of if name != one.name]
+        if one.name in combination.of and combination.determined != "no":
+            return (
+                f"{said}; the runs know it only together with {' and '.join(others)}, as "
+                f"{combination.symbol}, so a wider bound would not help: fix one of them at its "
+                "known value, or add a run that tells them apart."
+            )
     return f"{said}; widen the bound or fix the parameter."
 
 

@@ -138,6 +138,8 @@ def identify(
     if not converged:
         parameters = tuple(replace(one, determined="no") for one in parameters)
         sensors = tuple(replace(one, determined="no") for one in sensors)
+    vehicle = problem.vehicle_at(solution.x)
+    judged = verdict(parameters, errors, vehicle) if converged else without_verdict(parameters)
     warnings = [
         *(warning for seen in problem.runs for warning in seen.inputs.warnings),
         *moved,
@@ -152,11 +154,9 @@ def identify(
             *outlier_findings(problem, runs),
             *disagreements(priors, problem.free),
             *whiteness_findings(tests),
-            *bound_findings([*parameters, *sensors]),
+            *bound_findings([*parameters, *sensors], judged.combinations),
         ]
-    vehicle, judged = problem.vehicle_at(solution.x), without_verdict(parameters)
     if converged:
-        judged = verdict(parameters, errors, vehicle)
         warnings += undetermined_findings([*parameters, *sensors], of_all, judged.combinations)
     return Fit(
         verdict=judged,

@@ -65,7 +65,10 @@ def verdict(
         directions=tuple(_directions(names, errors, gradients)),
         sentences=(
             *_of_parameters(classes),
-            *(_of_combination(one, classes["yes"]) for one in combined),
+            *(
+                _of_combination(one, classes["yes"])
+                for one in _news(combined, gradients, estimates)
+            ),
         ),
     )
 
@@ -116,6 +119,24 @@ def _held_together(
     worst = max(ORDER.index(estimates[k].determined) for k in members)
     better = ORDER.index(estimate.determined) < worst
     return estimate if better and errors.error_of(gradient) < PART_OF_APART * apart else None
+
+
+def _news(
+    combined: Sequence[CombinationEstimate],
+    gradients: Mapping[str, Array],
+    estimates: Sequence[ParameterEstimate],
+) -> list[CombinationEstimate]:
+    """Those that do not follow from one before them and the parameters that are determined."""
+    unknown = np.array([one.determined != "yes" for one in estimates])
+    found: list[CombinationEstimate] = []
+    ways: list[Array] = []
+    for one in combined:
+        way = gradients[one.name] * unknown
+        way = way / np.linalg.norm(way)
+        if not any(abs(float(way @ before)) > ALONG for before in ways):
+            found.append(one)
+            ways.append(way)
+    return found
 
 
 def _estimate(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from ridetune.engine.identification.combinations import COMBINATIONS
 from ridetune.engine.identification.fit import ParameterEstimate
-from ridetune.engine.identification.fit_findings import undetermined_findings
+from ridetune.engine.identification.fit_findings import bound_findings, undetermined_findings
 from ridetune.engine.identification.uncertainty import Uncertainty
 from ridetune.engine.identification.variables import FreeParameter
 from ridetune.engine.identification.verdict import by_class, verdict, without_verdict
@@ -71,6 +71,37 @@ def test_a_pair_is_told_once():
     combinations = verdict(estimates, errors, CAR).combinations
     assert "front.bar_rate" in [one.name for one in combinations]
     assert undetermined_findings(estimates, errors, combinations) == []
+
+
+def test_what_follows_from_a_combination_is_not_told_again():
+    """Oracle: K + 2 Ktor/d^2 with K known moves with Ktor and d as Ktor/d^2 does; with K unknown,
+    it is news."""
+    spring = "front.suspension.stiffness"
+    together = np.array([[0.04, 0.02, 0.0], [0.02, 0.01 + 1e-6, 0.0], [0.0, 0.0, 1e-6]])
+    rates = ["front.bar_rate", "front.wheel_rate_in_roll"]
+    found = judged(together, words=("no", "no", "yes"), names=(*NAMES, spring))
+    assert [one.name for one in found.combinations] == rates
+    assert [one for one in found.sentences if "together" in one] == [
+        one for one in found.sentences if "Ktor_F/d_F^2, the front" in one
+    ]
+    roll = np.array([*(2.0 * CAR.value(BAR) / CAR.value(DISTANCE) ** 2 * np.array([1, -2]))])
+    gradient = np.array([*roll, CAR.value(spring)]) / NAMED[rates[1]].value(CAR)
+    across = np.cross(gradient, [2.0, 1.0, 0.0])
+    unsprung = along((0.05, (2, 1, 0)), (0.05, across), (1e-6, gradient))
+    found = judged(unsprung, words=("no", "no", "no"), names=(*NAMES, spring))
+    assert sum("wheel rate in roll" in one for one in found.sentences) == 1
+
+
+def test_a_wider_bound_is_no_remedy_for_what_only_a_combination_tells():
+    """Where the runs know the rate alone, its parts may lie at any bound."""
+    estimates = estimated(("no", "no"), at_bound=True)
+    [first, _] = bound_findings(estimates)
+    assert first.endswith("widen the bound or fix the parameter.")
+    together = along((0.5, (2, 1)), (1e-4 / 5, (1, -2)))
+    combinations = judged(together, words=("no", "no"), at_bound=True).combinations
+    [first, _] = bound_findings(estimates, combinations)
+    assert f"only together with {DISTANCE}, as Ktor_F/d_F^2" in first
+    assert "widen the bound" not in first
 
 
 def test_a_direction_that_no_run_moves_leaves_the_rate_known():
