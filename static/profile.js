@@ -9,6 +9,7 @@ import { jobs } from "./job.js";
 import { refused } from "./notices.js";
 import { AXIS, COLOURS, fitWidth } from "./plots.js";
 import * as units from "./units.js";
+import { worded } from "./wording.js";
 
 const HEIGHT = 196;
 /** Points on each side at most, as the service has it. */
@@ -120,17 +121,12 @@ function drawing(result, profile, others) {
   return h("div", {},
     h("p", { className: "outcome profile-said" }, symbolOf(profile.name), " 95 %: ",
       h("strong", {}, units.withUnit(span(profile.confidence_interval, factor), unit)),
-      h("span", { className: "soft" }, ` by the profile; ${span(estimate.confidence_interval, factor)} by the fit's errors.${ends(profile)}`)),
+      h("span", { className: "soft" }, ` by the profile; ${span(estimate.confidence_interval, factor)} by the fit's errors.`)),
+    profile.sentences.map((text) => h("p", { className: "hint" }, worded(text))),
     box, steps,
     h("p", { className: "legend-line profile-legend" }, h("span", { className: "key now" }, "profile"),
       h("span", { className: "key reference" }, "if the errors were exactly Gaussian"),
       h("span", { className: "key quantile" }, `± ${units.number(profile.quantile, 3)}, 95 %`)));
-}
-
-/** What ends a side that the runs leave open. */
-function ends({ lower_at_bound: lower, upper_at_bound: upper }) {
-  if (lower && upper) return " Both sides end at the search's bounds.";
-  return lower || upper ? ` The ${lower ? "lower" : "upper"} side ends at the search's bound.` : "";
 }
 
 function draw(box, profile, estimate, { display_factor: factor, display_unit: unit, label }, at) {

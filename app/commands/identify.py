@@ -144,6 +144,9 @@ def _print_profiles(profiles: Sequence[Profile]) -> None:
         rows.append((one.name, low, high, parameter(one.name).unit))
     print()
     print_table(rows, right=(1, 2))
+    for one in profiles:
+        for sentence in one.sentences:
+            print(f"{one.name}: {sentence}")
 
 
 def _shown_end(end: float) -> str:

@@ -11,7 +11,8 @@ with s_0 the error by the cost's second derivative alone, s_0^2 = (J^T J)^-1 (wi
 Statistical Inference, 1997, 4.7: the scaled likelihood ratio of a wrong likelihood). The 95 %
 interval is where t stays below the quantile. Where the fit is as good as linear it is that of the
 fit; along a curved valley and next to a bound it is right where the other is not, and it stays
-open towards a side on which t never gets there.
+open towards a side on which t never gets there. Where another parameter reaches its bound on the
+way, the cost rises by that bound and not by the runs alone, and the profile says so.
 """
 
 import math
@@ -25,10 +26,12 @@ from numpy.typing import NDArray
 from ..errors import ProblemError
 from ..parameters import parameter
 from ..simulation.simulate import rims_batch
+from ..units import after_number
 from .problem import FreeParameter, Problem
 from .residuals import Residuals, Simulate
 from .search import Found, Search
 from .uncertainty import DIRECTION_TOLERANCE, information, uncertainty
+from .variables import AT_BOUND
 
 Array = NDArray[np.float64]
 
@@ -41,6 +44,13 @@ would reach neither its bound nor the quantile."""
 
 PAST = 1.1
 """Quantiles from the fit at which a side ends."""
+
+TOO_FAR = 1.5
+"""Quantiles from the fit beyond which a point is tried again at half the stride, as where another
+parameter has met its bound on the way: the interval's end would be guessed between far points."""
+
+HALVINGS = 8
+"""On each side at most."""
 
 POINTS = 16
 """On each side at most."""
@@ -70,15 +80,18 @@ class Profile:
     points : by value, the fit's own among them
     quantile : of t, at which the 95 % interval ends
     confidence_interval : an end infinite where the runs leave that side open
-    lower_at_bound, upper_at_bound : whether a bound of the search, not the runs, ends the profile
+    lower_at_bound, upper_at_bound : what is at a bound of the search where a side ends: the
+        parameter itself, or others that go there with it
+    sentences : which bounds end the sides, if any do
     """
 
     name: str
     points: tuple[ProfilePoint, ...]
     quantile: float
     confidence_interval: tuple[float, float]
-    lower_at_bound: bool
-    upper_at_bound: bool
+    lower_at_bound: tuple[str, ...]
+    upper_at_bound: tuple[str, ...]
+    sentences: tuple[str, ...]
     simulations: int
 
 
@@ -113,6 +126,7 @@ def profile(
     above = tour.points(1.0, errors.quantile, told)
     points = [*reversed(below), tour.centre, *above]
     one = problem.free[held]
+    lower, upper = (tour.at_bound(points[end]) for end in (0, -1))
     return Profile(
         name=full,
         points=tuple(points),
@@ -121,8 +135,12 @@ def profile(
             _end(one, [tour.centre, *below], errors.quantile, -math.inf),
             _end(one, [tour.centre, *above], errors.quantile, math.inf),
         ),
-        lower_at_bound=one.at_lower(points[0].value),
-        upper_at_bound=one.at_upper(points[-1].value),
+        lower_at_bound=lower,
+        upper_at_bound=upper,
+        sentences=(
+            *_ended_by(full, "lower", lower, points[0]),
+            *_ended_by(full, "upper", upper, points[-1]),
+        ),
         simulations=tour.simulations,
     )
 
@@ -170,11 +188,16 @@ class _Tour:
         ahead, stride, before = (way if rising else -way), self._stride, 0.0
         first, last = one.ends
         found: list[ProfilePoint] = []
+        halvings = HALVINGS
         while len(found) < POINTS and first < at < last:
             further = min(max(at + ahead * stride, first), last)
             moved, cost = self._refitted(further, others + slope * (further - at))
             rise = max(2.0 * (cost - self._best.cost), 0.0)
             distance = way * math.sqrt(rise) * self._ratio
+            if abs(distance) > TOO_FAR * quantile and halvings:
+                halvings -= 1
+                stride = 0.5 * abs(further - at)
+                continue
             found.append(self._point(further, moved, cost, distance))
             told(len(found))
             slope = (moved - others) / (further - at)
@@ -187,6 +210,21 @@ class _Tour:
                 stride = max(stride, room / left)
             before = distance
         return found
+
+    def at_bound(self, end: ProfilePoint) -> tuple[str, ...]:
+        """What is at a bound at a side's end: the parameter, and others that go there with it."""
+        held = self._problem.free[self._held]
+        found = [held.name] if held.at_bound(end.value) else []
+        way = held.variable(end.value) - held.variable(self.centre.value)
+        rest = [one for one in self._problem.free if one is not held]
+        for one, slope in zip(rest, self._slope[: len(rest)].tolist(), strict=True):
+            value, before = end.others[one.name], self.centre.others[one.name]
+            first, last = one.ends
+            outwards = slope * way if one.variable(value) > 0.5 * (first + last) else -slope * way
+            driven = outwards > AT_BOUND * (last - first)
+            if one.at_bound(value) and (driven or not one.at_bound(before)):
+                found.append(one.name)
+        return tuple(found)
 
     def _refitted(self, at: float, others: Array) -> tuple[Array, float]:
         """The others' best variables with the parameter held, and the cost."""
@@ -214,6 +252,24 @@ class _Tour:
         of_car = others[: len(rest)]
         values = {each.name: each.value(float(x)) for each, x in zip(rest, of_car, strict=True)}
         return ProfilePoint(one.value(at), distance, cost, values)
+
+
+def _ended_by(held: str, side: str, names: Sequence[str], end: ProfilePoint) -> list[str]:
+    """What to say of a side that ends with some parameters at their bounds."""
+    values = {**end.others, held: end.value}
+    told = {
+        name: f"{name} of {values[name]:.4g}{after_number(parameter(name).unit)}" for name in names
+    }
+    sentences = []
+    if held in told:
+        sentences.append(f"The {side} side ends at the search's bound, {told.pop(held)}.")
+    if told:
+        is_at, it = ("is at its bound", "it") if len(told) == 1 else ("are at their bounds", "them")
+        sentences.append(
+            f"On the {side} side {' and '.join(told.values())} {is_at}, and not the runs alone end "
+            f"the profile; widen the search, or fix {it} at what is known."
+        )
+    return sentences
 
 
 def _end(

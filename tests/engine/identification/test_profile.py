@@ -83,8 +83,36 @@ def test_the_others_follow_along_a_valley():
         assert point.value * point.others[DAMPER] == pytest.approx(product, rel=1e-4)
         assert abs(point.distance) < 0.1
     assert found.confidence_interval == (-math.inf, math.inf)
-    assert found.lower_at_bound
-    assert found.upper_at_bound
+    assert found.lower_at_bound == found.upper_at_bound == (SPRING,)
+    assert [one[:24] for one in found.sentences] == [
+        "The lower side ends at t",
+        "The upper side ends at t",
+    ]
+
+
+def test_a_side_that_another_parameter_s_bound_ends_says_so():
+    """Oracle: as above, only the product acts. The damper may fall to 0.8 of what it is, so the
+    spring may rise by 1/0.8 before the cost does; the runs would have let it go on."""
+
+    def simulate(cars, inputs, traction):
+        values = stand_in.values_of(cars)
+        merged = {
+            SPRING: values[SPRING] * values[DAMPER] / 1700.0,
+            DAMPER: np.full(len(cars), 1700.0),
+        }
+        return stand_in.histories(values | merged, inputs)
+
+    least = 0.8 * CAR.value(DAMPER)
+    fit, problem = fitted(
+        simulate, free=[SPRING, DAMPER], bounds={SPRING: (1e4, 6e4), DAMPER: (least, 9e3)}
+    )
+    found = profile(problem, SPRING, simulate=simulate)
+    product = fit.vehicle.value(SPRING) * fit.vehicle.value(DAMPER)
+    assert found.upper_at_bound == (DAMPER,)
+    assert found.confidence_interval[1] == pytest.approx(product / least, rel=0.01)
+    assert found.lower_at_bound == (SPRING,)
+    [_, upper] = found.sentences
+    assert f"On the upper side {DAMPER} of {least:.4g} N s/m is at its bound" in upper
 
 
 def test_a_profile_goes_on_to_where_a_parameter_ends_that_the_runs_hardly_hold():
