@@ -106,7 +106,8 @@ def reply(request: SimulationRequest, task: Task) -> Reply:
 def _metric(metric: Metric, within: Bands | None) -> dict[str, Any]:
     """A figure, with its interval where there are bands; null for an end that is open."""
     told = asdict(metric)
-    return told if within is None else {**told, "interval": list(within.figures[metric.name])}
+    interval = within.figures.get(metric.name) if within else None
+    return told if interval is None else {**told, "interval": list(interval)}
 
 
 def _vehicle(request: SimulationRequest, session: str, store: Store) -> Vehicle:

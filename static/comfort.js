@@ -71,7 +71,7 @@ function row(metric, before, within) {
   return h("tr", {},
     h("th", { scope: "row", title: metric.meaning ?? "" }, metric.label),
     h("td", {}, before ? units.number(before.value * factor, 3) : "–"),
-    h("td", {}, units.number(metric.value * factor, 3), within ? spread(within.interval, factor) : null),
+    h("td", {}, units.number(metric.value * factor, 3), within?.interval ? spread(within.interval, factor) : null),
     h("td", { className: "unit" }, units.pretty(metric.display_unit ?? metric.unit)),
     changed(metric, before));
 }

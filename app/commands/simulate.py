@@ -78,8 +78,9 @@ def _print_figures(run: Run, found: Bands) -> None:
     """Print every figure with its interval."""
     rows = [("figure", "value", "from", "to (95 %)", "unit")]
     for one in metrics(run):
-        ends = (end * one.display_factor for end in found.figures[one.name])
-        low, high = (significant(end, 4) if math.isfinite(end) else "open" for end in ends)
+        ends = [end * one.display_factor for end in found.figures.get(one.name, ())]
+        told = [significant(end, 4) if math.isfinite(end) else "open" for end in ends]
+        low, high = told or ("counted", "no band")
         value = significant(one.value * one.display_factor, 4)
         rows.append((one.label, value, low, high, one.display_unit))
     print_table(rows, right=(1, 2, 3))

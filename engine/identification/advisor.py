@@ -9,8 +9,8 @@ values and the scatter M of the residuals it would leave (`expected_noise`):
 
 so that the errors afterwards are those of a fit to all runs, as far as the current values are near
 the true ones. What is found of the sensors counts as unknown throughout. Candidates are ranked by
-how many classes ("no", "weakly", "yes") the parameters rise together, then by the information
-gained,
+whether they keep the tyres on the road, by how many classes ("no", "weakly", "yes") the parameters
+rise together, then by the information gained,
 
     gain = 1/2 log2 (det(C_before + f^2) / det(C_after + f^2)) bits,
 
@@ -258,7 +258,10 @@ def _ranked(
     now: _State,
     free: Sequence[FreeParameter],
 ) -> list[Advice]:
-    """The best first: by classes, then by bits, gained over `before`; both are told over `now`."""
+    """The best first: by classes, then by bits, gained over `before`; both are told over `now`.
+
+    Those that lift a tyre come last: no car would record what the model does there.
+    """
     scored = []
     for one in driven:
         after = _State.of(before.information + added[one.key], free)
@@ -273,9 +276,9 @@ def _ranked(
             _sentence(one.manoeuvre.name, before.parameters, after.parameters),
             one.remark,
         )
-        scored.append((promoted, after.bits, advice))
-    scored.sort(key=lambda row: row[:2], reverse=True)
-    return [advice for _, _, advice in scored]
+        scored.append(((not one.lifts, promoted, after.bits), advice))
+    scored.sort(key=lambda row: row[0], reverse=True)
+    return [advice for _, advice in scored]
 
 
 def _variables(free: Sequence[Variable]) -> Array:

@@ -6,10 +6,10 @@ With x the search's variables of what was free, C their covariance and q the qua
     y +- q sqrt(Y C Y^T),    Y = dy/dx,
 
 linearised, by differences of 2 n cars. A curve that moves along a direction which the runs do not
-determine has none. By sampling, cars are drawn from the covariance, scaled from the normal
-distribution's quantile to q, as far as the bounds admit them, and along unknown directions evenly;
-the band lies between the 2.5th and the 97.5th percentile of their curves. Figures (`metrics`) go
-the same ways.
+determine has none, nor has a figure that counts samples, which small steps leave as it is. By
+sampling, cars are drawn from the covariance, scaled from the normal distribution's quantile to q,
+as far as the bounds admit them, and along unknown directions evenly; the band lies between the
+2.5th and the 97.5th percentile of their curves. Figures (`metrics`) go the same ways.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -54,7 +54,8 @@ class Bands:
     """95 % bands around one simulated car.
 
     lower, upper : runs with the channels of the simulation; not a number where a channel is open
-    figures : (lower, upper) by the names of `metrics`, not a number where open
+    figures : (lower, upper) by the names of `metrics`, not a number where open; linearised,
+        without those that count samples
     warnings : which are open and by which parameters, and how many cars failed
     """
 
@@ -68,11 +69,13 @@ class Bands:
 class _Curves:
     """Everything predicted of some cars, one after the other in one row a car.
 
+    names : of the figures;  counted : of those that count samples
     rows (cars, values) : not a number where a car failed
     """
 
     run: Run
     names: tuple[str, ...]
+    counted: tuple[str, ...]
     rows: Array
 
 
@@ -143,7 +146,8 @@ def _linear(
             half_width[places[name]] = np.nan
         if opened:
             warnings.append(_open(free, direction, opened))
-    return _bands(found, middle - half_width, middle + half_width, warnings)
+    told = [name for name in found.names if name not in found.counted]
+    return _bands(found, middle - half_width, middle + half_width, told, warnings)
 
 
 def _sampled(
@@ -171,7 +175,7 @@ def _sampled(
             f"{failed} of {cars} cars within the fit's errors do not come through; the bands are "
             "those of the others."
         )
-    return _bands(found, lower, upper, warnings)
+    return _bands(found, lower, upper, found.names, warnings)
 
 
 def percentiles(rows: Array) -> Array:
@@ -271,9 +275,11 @@ def _curves(cars: Sequence[Vehicle | None], excitation: Excitation, model: Model
         runs = pool.map(simulated, cars)
         nominal = next(runs)
         assert nominal is not None  # it has raised otherwise
-        names = tuple(one.name for one in metrics(nominal))
+        figures = metrics(nominal)
+        names = tuple(one.name for one in figures)
+        counted = tuple(one.name for one in figures if one.counted)
         rows = [_row(nominal, nominal, names), *(_row(run, nominal, names) for run in runs)]
-    return _Curves(nominal, names, np.array(rows))
+    return _Curves(nominal, names, counted, np.array(rows))
 
 
 def _row(run: Run | None, nominal: Run, names: Sequence[str]) -> Array:
@@ -296,15 +302,20 @@ def _places(found: _Curves) -> dict[str, slice]:
     return channels | {name: slice(first + k, first + k + 1) for k, name in enumerate(found.names)}
 
 
-def _bands(found: _Curves, lower: Array, upper: Array, warnings: Sequence[str]) -> Bands:
+def _bands(
+    found: _Curves, lower: Array, upper: Array, told: Sequence[str], warnings: Sequence[str]
+) -> Bands:
     run, places = found.run, _places(found)
     low, high = (
         Run(run.name, run.time, {name: side[places[name]] for name in run.columns})
         for side in (lower, upper)
     )
-    figures = {name: places[name].start for name in found.names}
-    told = {name: (float(lower[place]), float(upper[place])) for name, place in figures.items()}
-    return Bands(low, high, told, tuple(warnings))
+    figures = {
+        name: (float(lower[place]), float(upper[place]))
+        for name in told
+        for place in [places[name].start]
+    }
+    return Bands(low, high, figures, tuple(warnings))
 
 
 def _open(free: Sequence[FreeParameter], direction: Array, opened: Sequence[str]) -> str:

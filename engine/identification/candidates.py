@@ -26,7 +26,7 @@ RIG_DURATION = 20.0
 """Of a sweep on the rig, s: about that of a drive, so that neither gains by its length alone."""
 
 LIFTED = 0.005
-"""Share of the time without tyre load that is worth a word."""
+"""Share of the time without tyre load beyond which what a run would tell is in doubt."""
 
 _DRIVEN = ("1", "2", "brake-54", "bump", "pothole", "constant-speed-c")
 _RIG = ("heave", "pitch", "roll", "warp")
@@ -37,12 +37,14 @@ class Drive:
     """What a car would record of a manoeuvre.
 
     run : without noise, named by the manoeuvre's key; None where the car does not come through
+    lifts : whether a tyre leaves the road, where the model pulls on it and a car would fly
     remark : a sentence on what was assumed, or why there is no run; else empty
     """
 
     key: str
     manoeuvre: Manoeuvre
     run: Run | None
+    lifts: bool = False
     remark: str = ""
 
 
@@ -120,7 +122,7 @@ def _drive(vehicle: Vehicle, key: str, manoeuvre: Manoeuvre, *, sample_step: flo
     try:
         found = FreeExcitation(manoeuvre, sample_step=sample_step).simulate(braked(vehicle))
     except RideError as error:
-        return Drive(key, manoeuvre, None, f"The car does not come through: {error}")
+        return Drive(key, manoeuvre, None, remark=f"The car does not come through: {error}")
     remarks = []
     if vehicle.brakes is None and manoeuvre.brake is not None:
         remarks.append(
@@ -129,11 +131,13 @@ def _drive(vehicle: Vehicle, key: str, manoeuvre: Manoeuvre, *, sample_step: flo
             "before such a run is fitted."
         )
     lifted = max(found.negative_load_share.values())
-    if lifted > LIFTED:
+    lifts = lifted > LIFTED
+    if lifts:
         remarks.append(
             f"A tyre would carry nothing for {in_percent(lifted)} of the time, where the model "
-            "pulls on the road."
+            "pulls on the road, so it ranks behind those that keep to it."
         )
     names = (*INPUT_CHANNELS, *OUTPUT_CHANNELS, "chassis.v_x")
     channels = {name: found.run[name] for name in names if name in found.run}
-    return Drive(key, manoeuvre, Run(key, found.run.time, channels), " ".join(remarks))
+    run = Run(key, found.run.time, channels)
+    return Drive(key, manoeuvre, run, lifts, " ".join(remarks))

@@ -44,7 +44,10 @@ AXLE_WORDS: dict[AxleName, str] = {"front": "Front", "rear": "Rear"}
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """One figure; `value` is in `unit` (SI), shown as value * display_factor in `display_unit`."""
+    """One figure; `value` is in `unit` (SI), shown as value * display_factor in `display_unit`.
+
+    counted : whether samples are counted, so that it stays as it is under the smallest changes
+    """
 
     name: str
     label: str
@@ -53,6 +56,7 @@ class Metric:
     display_unit: str
     display_factor: float
     meaning: str
+    counted: bool = False
 
 
 def metrics(run: Run) -> list[Metric]:
@@ -225,6 +229,7 @@ def _tyre_load(run: Run) -> Iterator[Metric]:
             float(np.mean(loads <= 0.0)),
             *("1", "%", 100.0),
             "share of the samples in which a tyre carries nothing",
+            counted=True,
         )
         for name, value in (("least", np.min(loads)), ("most", np.max(loads))):
             yield Metric(

@@ -183,6 +183,16 @@ def test_a_car_without_brakes_is_told_what_to_add():
     assert '"brakes"' in found.ranked[0].remark
 
 
+def test_a_road_that_lifts_the_tyres_comes_last_however_much_it_would_tell():
+    """Where the model pulls on the road, a car would fly: what it would record is not known."""
+    rough = {key: catalogue()[f"constant-speed-{key}"] for key in "ad"}
+    smooth, lifted = advise_unmeasured(CAR, rough).ranked
+    assert (smooth.key, lifted.key) == ("a", "d")
+    assert lifted.gain > smooth.gain
+    assert "a tyre would carry nothing" in lifted.remark.lower()
+    assert not smooth.remark
+
+
 def test_a_manoeuvre_that_the_car_does_not_survive_is_left_out_with_a_reason():
     wild = Manoeuvre("Full throttle", "road", 30.0, drive=DriveTable((0.0, 30.0), (5e3, 5e3)))
     found = advise_unmeasured(CAR, {"wild": wild, **chosen(("heave",))})

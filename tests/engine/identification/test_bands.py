@@ -98,6 +98,23 @@ def test_sampled_bands_hold_95_percent_of_a_distribution(cars):
     assert np.mean(upper - lower) == pytest.approx(0.95, abs=4.0 * error)
 
 
+def test_a_share_of_samples_has_a_band_by_sampling_alone():
+    """Between two samples' zeros it stays as it is, so that differences would call it known."""
+    name = "tyre.front.load.lifted"
+
+    class Loads(LinearToy):
+        def simulate(self, car, model="8dof"):
+            loads = {
+                f"tyre.{side}.load": 100.0 * (TIME - car.value(ANGLES[0])) for side in ("fl", "fr")
+            }
+            return Drive(Run("toy", TIME, loads))
+
+    fit = toy_fit([[4e-2, 0.0], [0.0, 1e-8]])
+    assert name not in bands(fit, fit.vehicle, Loads()).figures
+    low, high = bands(fit, fit.vehicle, Loads(), method="sampled").figures[name]
+    assert low < 5 / 11 < high  # of the samples up to 0.4 s
+
+
 def test_what_depends_on_an_unknown_direction_has_no_band():
     """The rear angle is unknown: z has no band, pitch, which it does not touch, has one."""
     fit = toy_fit([[4e-4, 0.0], [0.0, 0.0]], [[0.0, 1.0]])
