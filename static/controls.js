@@ -342,5 +342,5 @@ function band(parts, estimate, factor, at, shown) {
   spread.className = `spread ${estimate.determined}`;
   spread.title =
     `Identified ${units.withUnit(units.number(value), parameter.display_unit)}, 95 % interval ` +
-    `${span(said, factor, 4)}; ${DETERMINED[estimate.determined]}`;
+    `${span(said, factor)}; ${DETERMINED[estimate.determined]}`;
 }

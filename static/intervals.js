@@ -5,10 +5,14 @@ import * as units from "./units.js";
 /** Whether an interval says anything. */
 export const isKnown = (interval) => Boolean(interval?.some(Number.isFinite));
 
-/** "2.1 … 3.4", "from 2.1", "up to 3.4" or "unbounded"; SI times `factor`. */
-export function span([lower, upper], factor, digits = 3) {
-  const [low, high] = [lower, upper].map((end) =>
-    (Number.isFinite(end) ? units.number(end * factor, digits) : null));
+/**
+ * "2.1 … 3.4", "from 2.1", "up to 3.4" or "unbounded"; SI times `factor`. An end that stands alone has the
+ * digits of the value beside it, which may be as near to it as at a bound.
+ */
+export function span([lower, upper], factor) {
+  const ends = [lower, upper];
+  const digits = ends.every(Number.isFinite) ? 3 : 4;
+  const [low, high] = ends.map((end) => (Number.isFinite(end) ? units.number(end * factor, digits) : null));
   if (low !== null && high !== null) return `${low} … ${high}`;
   if (low !== null) return `from ${low}`;
   return high !== null ? `up to ${high}` : "unbounded";

@@ -126,12 +126,12 @@ def print_fit(fit: Fit) -> None:
 
 
 def _error(lower: float, upper: float) -> str:
-    """Half of an interval, or the end that is known of one that lies open."""
+    """Half of an interval, or the end that is known of one that lies open, as exact as a value."""
     if math.isfinite(lower) and math.isfinite(upper):
         return significant((upper - lower) / 2.0, 2)
     if math.isfinite(lower):
-        return f"from {significant(lower, 3)}"
-    return f"up to {significant(upper, 3)}" if math.isfinite(upper) else "unbounded"
+        return f"from {significant(lower, 5)}"
+    return f"up to {significant(upper, 5)}" if math.isfinite(upper) else "unbounded"
 
 
 def _print_profiles(profiles: Sequence[Profile]) -> None:

@@ -209,3 +209,17 @@ def test_sentences_of_the_service_are_said_in_the_pages_words(visitor, said, sho
 def test_a_logarithmic_axis_has_few_lines_at_powers_of_ten(visitor, low, high, lines):
     found = in_module(visitor, "plots", "return m.decades(a[0], a[1]);", low, high)
     assert found == pytest.approx(lines)
+
+
+@pytest.mark.parametrize(
+    ("interval", "shown"),
+    [
+        ([13.96, None], "from 13.96"),
+        ([None, 13.96], "up to 13.96"),
+        ([2.1, 3.4], "2.10 … 3.40"),
+        ([None, None], "unbounded"),
+    ],
+)
+def test_an_end_that_stands_alone_is_not_rounded_beyond_its_value(visitor, interval, shown):
+    """A value of 13.96 at its bound is not "from 14.0"."""
+    assert in_module(visitor, "intervals", "return m.span(a[0], 1);", interval) == shown
