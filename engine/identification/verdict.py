@@ -64,7 +64,7 @@ def verdict(
         combinations=tuple(combined),
         directions=tuple(_directions(names, errors, gradients)),
         sentences=(
-            *_of_parameters(classes),
+            *_of_parameters(classes, _conditions(estimates, combined)),
             *(
                 _of_combination(one, classes["yes"])
                 for one in _news(combined, gradients, estimates)
@@ -192,10 +192,31 @@ def _along(axis: Array, gradients: Mapping[str, Array]) -> str | None:
     return best if best is not None and along[best] > ALONG else None
 
 
-def _of_parameters(classes: Mapping[str, Sequence[str]]) -> list[str]:
+def _conditions(
+    estimates: Sequence[ParameterEstimate], combined: Sequence[CombinationEstimate]
+) -> list[str]:
+    """Symbols of what is at a bound and holds the others to where they are by that.
+
+    One that the runs know only with another leaves the rest alone, and so does a damper's knee
+    beyond all speeds of the runs.
+    """
+    free = {name for one in combined for name in one.of}
+    return [
+        parameter(one.name).symbol
+        for one in estimates
+        if one.at_bound
+        and one.name not in free
+        and not (one.name.endswith("knee_speed") and one.free.at_upper(one.value))
+    ]
+
+
+def _of_parameters(classes: Mapping[str, Sequence[str]], conditions: Sequence[str]) -> list[str]:
+    where = "where its bound puts it" if len(conditions) == 1 else "where their bounds put them"
+    are = "is" if len(conditions) == 1 else "are"
+    held = f", if {_listed(conditions)} {are} {where}" if conditions else ""
     wording = {
-        "yes": "Determined to better than 15 %",
-        "weakly": "Determined weakly, to between 15 and 50 %",
+        "yes": f"Determined to better than 15 %{held}",
+        "weakly": f"Determined weakly, to between 15 and 50 %{held}",
         "no": "Not determined by these runs",
     }
     return [
@@ -215,6 +236,10 @@ def _of_combination(one: CombinationEstimate, known: Sequence[str]) -> str:
         told = f"{one.value:.4g}{unit} to {in_percent(half_width / abs(one.value))}"
     are = "are determined only together" if len(apart) > 1 else "is determined better"
     return (
-        f"{', '.join(apart[:-1])}{' and ' if apart[1:] else ''}{apart[-1]} {are}, as {one.symbol},"
+        f"{_listed(apart)} {are}, as {one.symbol},"
         f" the {one.label[0].lower()}{one.label[1:]}: {told}."
     )
+
+
+def _listed(symbols: Sequence[str]) -> str:
+    return f"{', '.join(symbols[:-1])}{' and ' if symbols[1:] else ''}{symbols[-1]}"

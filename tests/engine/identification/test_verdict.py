@@ -155,6 +155,19 @@ def test_a_parameter_at_its_bound_may_be_known_together_with_another():
     assert "front.bar_rate" in [one.name for one in found.combinations]
 
 
+def test_what_is_determined_next_to_a_bound_is_so_if_the_bound_is_right():
+    """A search that ended at a bound wanted to go on, and would have taken the others along; what
+    is known only together with another would not."""
+    apart, together = np.diag([1e-6, 0.04]), along((0.05, (2, 1)), (1e-4 / 5, (1, -2)))
+    found = judged(apart, words=("yes", "yes"), at_bound=True)
+    [sentence] = found.sentences
+    where = "if Ktor_F and d_F are where their bounds put them: Ktor_F, d_F."
+    assert sentence == f"Determined to better than 15 %, {where}"
+    for words in (("no", "yes"), ("no", "weakly")):
+        first = judged(together, words=words, at_bound=True).sentences[0]
+        assert "bound" not in first
+
+
 def test_independent_parameters_are_not_told_together():
     """Oracle: uncorrelated, the rate is as uncertain as its parts make it."""
     assert not judged(np.diag([0.02, 0.02])).combinations
