@@ -126,7 +126,7 @@ async function take(file) {
   const { length } = row.warnings;
   if (nextStage(row) !== "ready") {
     const stage = nextStage(row);
-    parts.told = notice("warning", `${nameOf(row.id)} is in`, `${lacks(row)}.`,
+    parts.dismiss = notice("warning", `${nameOf(row.id)} is in`, `${lacks(row)}.`,
       { label: TO_DO[stage], run: () => { hooks.open(); show(); intake.open(row.id, stage); } });
     return;
   }
@@ -262,7 +262,7 @@ function detail(row) {
   const names = row.channels.map(({ name }) => name).filter((name) => name !== "time");
   const stage = nextStage(row);
   const work = (key) => {
-    parts.told?.remove();
+    parts.dismiss?.();
     intake.open(row.id, key);
   };
   const choice = h("select", { "aria-label": "Channel to look at" },
