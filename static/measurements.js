@@ -321,9 +321,10 @@ async function preview(row, name, drawing, facts) {
   if (row.id !== selected || !drawing.isConnected) return;
   plot?.destroy();
   plot = new window.uPlot({
-    width: Math.max(drawing.clientWidth, 200), height: 132, legend: { show: false },
+    width: Math.max(drawing.clientWidth, 200), height: 144, legend: { show: false },
     scales: { x: { time: false } }, cursor: { show: false }, padding: [6, 10, 0, 0],
-    axes: [{ ...AXIS, size: 26, gap: 3 }, { ...AXIS, size: 46, gap: 4 }],
+    axes: [{ ...AXIS, size: 22, gap: 2, label: "time, s", labelFont: AXIS.font, labelSize: 14, labelGap: 0 },
+      { ...AXIS, size: 46, gap: 4 }],
     series: [{}, { stroke: COLOURS.measured, width: 1.2, points: { show: false } }],
   }, [Array.from(run.time), Array.from(run.values[name], (v) =>
     (Number.isFinite(v) ? v * factor : null))], drawing);
