@@ -7,16 +7,16 @@ import * as units from "./units.js";
 /** Correlation from which two parameters are hardly known apart. */
 const STRONG = 0.9;
 const MOST_PAIRS = 8;
-/** Width of the rows' heads, px, and from how many parameters on cells are narrower. */
-const HEAD = 44;
-const MANY = 12;
 
 export function view(result) {
   const names = result.parameters.map(({ name }) => name);
   const said = h("p", { className: "correlation-said", role: "status" });
-  return h("div", { className: "fit-two correlation-view" },
+  const element = h("div", { className: "fit-two correlation-view" },
     h("div", { className: "fit-main scrolls" }, map(result, names, said)),
     h("div", { className: "fit-side scrolls" }, said, legend(), pairs(result, names)));
+  // The style sheet shares the room among so many cells.
+  element.style.setProperty("--count", names.length);
+  return element;
 }
 
 function map({ correlation }, names, said) {
@@ -37,13 +37,14 @@ function map({ correlation }, names, said) {
       const at = cells.findIndex((row) => row.includes(event.target));
       if (at >= 0) focus(at + di, cells[at].indexOf(event.target) + dj);
     } } },
-  h("thead", {}, h("tr", {}, h("th"), names.map((name) => h("th", { scope: "col" }, symbolOf(name))))),
-  h("tbody", {}, cells.map((row, i) => h("tr", {}, h("th", { scope: "row" }, symbolOf(names[i])), row))));
-  table.style.width = `${HEAD + names.length * (names.length > MANY ? 25 : 30)}px`;
+  h("thead", {}, h("tr", {}, h("td"), names.map((name) => head("col", name)))),
+  h("tbody", {}, cells.map((row, i) => h("tr", {}, head("row", names[i]), row))));
   if (cells.length) cells[0][0].tabIndex = 0;
   tell(said);
   return table;
 }
+
+const head = (scope, name) => h("th", { scope, title: units.parameter(name).label }, symbolOf(name));
 
 function cell(value, i, j, names, said) {
   const known = Number.isFinite(value);
@@ -90,9 +91,11 @@ function pairs({ correlation, verdict }, names) {
   return h("section", {}, h("h3", {}, "Hardly known apart"),
     h("table", { className: "pairs" }, h("tbody", {}, found.slice(0, MOST_PAIRS).map(({ of, value }) => {
       const known = together(of);
-      return h("tr", {}, h("th", { scope: "row" }, symbolOf(of[0]), ", ", symbolOf(of[1])),
-        h("td", { className: "strong" }, units.fixed(value, 3)),
-        h("td", { className: "soft" }, known ? ["as ", h("span", { className: "formula" }, formula(known.symbol))] : ""));
+      return h("tr", {},
+        h("th", { scope: "row" }, symbolOf(of[0]), ", ", symbolOf(of[1]),
+          known ? h("p", { className: "hint", title: known.label }, "as ",
+            h("span", { className: "formula" }, formula(known.symbol))) : null),
+        h("td", { className: "strong" }, units.fixed(value, 3)));
     }))),
     found.length > MOST_PAIRS ? h("p", { className: "hint" }, `and ${found.length - MOST_PAIRS} pairs more`) : null);
 }

@@ -20,7 +20,7 @@ import { $, debounced, tabs } from "./dom.js";
 import * as identification from "./identification.js";
 import * as intake from "./intake.js";
 import * as measurements from "./measurements.js";
-import { banner, listenToKeys, notice, refused } from "./notices.js";
+import { banner, build as buildNotices, notice, refused } from "./notices.js";
 import * as profile from "./profile.js";
 import * as ride from "./ride.js";
 import * as scene from "./scene.js";
@@ -75,7 +75,7 @@ function build() {
   });
   timeline.build();
   timeline.listenToKeys();
-  listenToKeys();
+  buildNotices();
   controls.build({ onBaseline: setBaseline });
   ride.build();
   charts.build(() => want("now", "reference"));

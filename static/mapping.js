@@ -237,21 +237,27 @@ function standIns(column, entry) {
   box, `${values.map((value) => units.plain(value)).join(", ")} as missing`);
 }
 
+/** The list tells each channel at length; the chosen one is its name alone, for which a row has room. */
 function channelSelect(column) {
-  const option = (name, text) => h("option", { value: name, title: units.channel(name).sign ?? "" }, text);
   const named = (name) => `${name} · ${units.channel(name).label}`;
+  const option = (name, long) => h("option", { value: name, title: units.channel(name).sign ?? "", dataset: { long } });
   const seen = new Set(column.candidates.map(({ channel }) => channel));
   const likely = column.candidates.map(({ channel, confidence }) =>
     option(channel, `${named(channel)}, ${percent(confidence)}`));
+  const tell = () => {
+    for (const one of element.options) if (one.value) one.text = one.selected ? one.value : one.dataset.long;
+    element.title = element.value ? named(element.value) : "";
+  };
   // All channels in every row of a long file would make it slow; they come with the focus.
   const fill = () => {
     const chosen = element.value;
     element.append(...offered(get("channels").map(({ name }) => name)).map(([label, group]) =>
       h("optgroup", { label }, group.filter((name) => !seen.has(name)).map((name) => option(name, named(name))))));
     element.value = chosen;
+    tell();
   };
   const element = h("select", { "aria-label": `Channel of ${column.name}`,
-    on: { change: () => choose(column, element.value) } },
+    on: { change: () => { choose(column, element.value); tell(); } } },
   h("option", { value: "" }, "not used"),
   likely.length ? h("optgroup", { label: "Likely" }, likely) : null);
   for (const event of ["pointerdown", "focus"]) element.addEventListener(event, () => { if (!filled) fill(); filled = true; });
@@ -263,6 +269,7 @@ function channelSelect(column) {
       element.append(option(entry.channel, named(entry.channel)));
       element.value = entry.channel;
     }
+    tell();
   } };
 }
 

@@ -126,7 +126,7 @@ async function take(file) {
   const { length } = row.warnings;
   if (nextStage(row) !== "ready") {
     const stage = nextStage(row);
-    parts.told = notice("warning", `${nameOf(row.id)} is in`, `${lacks(row)}.`,
+    parts.dismiss = notice("warning", `${nameOf(row.id)} is in`, `${lacks(row)}.`,
       { label: TO_DO[stage], run: () => { hooks.open(); show(); intake.open(row.id, stage); } });
     return;
   }
@@ -262,7 +262,7 @@ function detail(row) {
   const names = row.channels.map(({ name }) => name).filter((name) => name !== "time");
   const stage = nextStage(row);
   const work = (key) => {
-    parts.told?.remove();
+    parts.dismiss?.();
     intake.open(row.id, key);
   };
   const choice = h("select", { "aria-label": "Channel to look at" },
@@ -321,9 +321,10 @@ async function preview(row, name, drawing, facts) {
   if (row.id !== selected || !drawing.isConnected) return;
   plot?.destroy();
   plot = new window.uPlot({
-    width: Math.max(drawing.clientWidth, 200), height: 132, legend: { show: false },
+    width: Math.max(drawing.clientWidth, 200), height: 144, legend: { show: false },
     scales: { x: { time: false } }, cursor: { show: false }, padding: [6, 10, 0, 0],
-    axes: [{ ...AXIS, size: 26, gap: 3 }, { ...AXIS, size: 46, gap: 4 }],
+    axes: [{ ...AXIS, size: 22, gap: 2, label: "time, s", labelFont: AXIS.font, labelSize: 14, labelGap: 0 },
+      { ...AXIS, size: 46, gap: 4 }],
     series: [{}, { stroke: COLOURS.measured, width: 1.2, points: { show: false } }],
   }, [Array.from(run.time), Array.from(run.values[name], (v) =>
     (Number.isFinite(v) ? v * factor : null))], drawing);

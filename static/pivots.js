@@ -1,6 +1,7 @@
 // Where the pivots lie by drawing or bench, typed to be held against where a fit puts them.
 
 import { h } from "./dom.js";
+import { symbolOf } from "./formula.js";
 import * as units from "./units.js";
 
 const AXLES = { front: "Front", rear: "Rear" };
@@ -50,5 +51,5 @@ function field(name, axle) {
     } },
   });
   fields.push({ input, name, axle });
-  return [input, h("span", { className: "unit" }, unit)];
+  return [symbolOf(name), input, h("span", { className: "unit" }, unit)];
 }

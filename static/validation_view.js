@@ -118,7 +118,7 @@ function estimates({ fit, geometry }) {
   const measured = Object.keys(geometry).length > 0;
   const head = ["Parameter", "Value", "± (95 %)", "Unit", ...(measured ? ["By geometry"] : []),
     "Searched between", "Determined"];
-  return h("div", { className: "wide-table" }, h("table", { className: `validation-estimates${measured ? " with-geometry" : ""}` },
+  return h("div", { className: "wide-table" }, h("table", { className: "validation-estimates" },
     h("thead", {}, h("tr", {}, head.map((text) =>
       h("th", { scope: "col", className: text === "Unit" ? "unit" : "" }, text)))),
     h("tbody", {}, fit.parameters.map((one) => {

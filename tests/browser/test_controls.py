@@ -8,10 +8,13 @@ pytestmark = pytest.mark.browser
 STIFFNESS = "front.suspension.stiffness"
 
 
-def add_message(visitor, title):
+def add_message(visitor, title, kind="info"):
     visitor.page.evaluate(
-        "async (t) => (await import('/static/notices.js')).notice('info', t, 'More. '.repeat(12))",
-        title,
+        """async ([kind, title]) => {
+            const { notice } = await import("/static/notices.js");
+            notice(kind, title, "More. ".repeat(12));
+        }""",
+        [kind, title],
     )
 
 
@@ -130,6 +133,35 @@ def test_messages_are_read_and_dismissed_by_keyboard(visitor):
     keyboard.press("Escape")
     assert visitor.element(".notice").count() == 0
     assert came_from.evaluate("(slider) => slider === document.activeElement")
+
+
+def test_messages_are_counted_stacked_and_all_in_reach(visitor):
+    """Two are in sight; what is said again is counted; errors stay until they are dismissed."""
+    visitor.page.clock.install()
+    for title, kind in (
+        ("A", "error"),
+        ("B", "error"),
+        ("C", "info"),
+        ("D", "info"),
+        ("B", "error"),
+    ):
+        add_message(visitor, title, kind)
+    in_sight = visitor.element(".notice:visible strong")
+    assert in_sight.all_inner_texts() == ["B.", "D."]
+    assert visitor.element(".notice .badge").all_inner_texts() == ["× 2"]
+    older = visitor.element("#notices-older")
+    assert older.inner_text() == "2 older messages, errors among them"
+    older.focus()
+    visitor.page.keyboard.press("Enter")
+    assert in_sight.all_inner_texts() == ["B.", "D.", "C.", "A."]
+    visitor.page.clock.run_for(600_000)
+    assert in_sight.all_inner_texts() == ["B.", "A."]
+    assert not older.is_visible()
+    for title in ("E", "F"):
+        add_message(visitor, title)
+    visitor.click("#notices-dismiss")
+    assert visitor.element(".notice").count() == 0
+    assert not older.is_visible()
 
 
 def test_what_a_select_shows_is_not_cut_off(visitor):

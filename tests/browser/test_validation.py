@@ -7,6 +7,7 @@ import pytest
 from ridetune.app.cli import main
 
 from .conftest import SAMPLES
+from .cut_off import cut_off
 
 pytestmark = pytest.mark.browser
 
@@ -97,6 +98,7 @@ def test_the_fitted_car_is_validated_on_the_page(visitor):
         == "10.00"
     )
     assert visitor.element("#validation .validation-scores tbody").count() == 2
+    assert cut_off(visitor) == []
     with visitor.page.context.expect_page() as opened:
         visitor.click("#report")
     report = opened.value
