@@ -336,8 +336,8 @@ function band(parts, estimate, factor, at, shown) {
   const half = (high - low) / 2;
   const value = estimate.value * factor;
   spread.textContent = !holds(estimate) ? `fit ${units.number(value, 3)}`
-    : open[0] ? `≤ ${units.number(high, 3)}`
-      : open[1] ? `≥ ${units.number(low, 3)}`
+    : open[0] ? `≤ ${units.number(high)}`
+      : open[1] ? `≥ ${units.number(low)}`
         : half > Math.abs(value) ? "± >100 %" : `± ${units.number(half, 2)}`;
   spread.className = `spread ${estimate.determined}`;
   spread.title =
