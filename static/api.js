@@ -111,6 +111,7 @@ export const session = () => json("GET", base);
 /** Outlives the page, so that leaving it does not lose the last move. */
 export const saveVehicle = (vehicle) =>
   json("PUT", `${base}/vehicle`, { body: vehicle, keepalive: true });
+export const saveSetup = (setup) => json("PUT", `${base}/setup`, { body: setup, keepalive: true });
 export const saveBaseline = (vehicle) => json("PUT", `${base}/baseline`, { body: vehicle });
 export const simulate = (body) =>
   frames("POST", `${base}/simulations`, { body, accept: FRAMES });

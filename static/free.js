@@ -9,9 +9,6 @@ import { get, on, set } from "./store.js";
 import * as units from "./units.js";
 
 const COLUMNS = ["Free", "Parameter", "Start", "Lower", "Upper", "Unit"];
-const fixed = new Set();
-/** Typed bounds, {name: [SI or null, SI or null]}. */
-const typed = {};
 /** What brings each row up to date with sliders and bounds. */
 let rows = [];
 let note = null;
@@ -19,7 +16,6 @@ let body = null;
 
 /** Keep the table's numbers in step with sliders and default bounds. */
 export function build() {
-  holdDampers();
   on("values defaultBounds fit", () => { if (note) show(); });
 }
 
@@ -41,17 +37,17 @@ function fill() {
 
 const shown = () => get("parameters").filter(({ name }) => name in get("values"));
 
-const damperNames = () => get("parameters").filter(ofBentDamper).map(({ name }) => name);
+export const damperNames = () => get("parameters").filter(ofBentDamper).map(({ name }) => name);
 
 /** The dampers that a car brings along are known, as its masses are, until they are freed here. */
 export function holdDampers() {
-  damperNames().forEach((name) => fixed.add(name));
+  set({ fixed: [...new Set([...get("fixed"), ...damperNames()])] });
 }
 
 function dampers() {
   const box = h("input", {
     type: "checkbox", id: "two-slope", checked: bent(), on: { change: () => {
-      if (box.checked) damperNames().forEach((name) => fixed.delete(name));
+      if (box.checked) set({ fixed: get("fixed").filter((name) => !damperNames().includes(name)) });
       else holdDampers();
       bend(box.checked);
     } },
@@ -78,20 +74,22 @@ export function view() {
     h("p", { className: "hint" }, h("span", { className: "mark-own" }, "typed"), " ",
       h("span", { className: "mark-outside" }, "from the applied fit")),
     sensors.view(),
-    priors.view(shown().map(({ name }) => name), (name) => !fixed.has(name)));
+    priors.view(shown().map(({ name }) => name), isFree));
   show();
   return section;
 }
 
 /** Names of the free parameters. */
 export const names = () =>
-  shown().map(({ name }) => name).filter((name) => !fixed.has(name));
+  shown().map(({ name }) => name).filter(isFree);
+
+const isFree = (name) => !get("fixed").includes(name);
 
 /** {name: [lower, upper]} of the free parameters whose bounds are not the default. */
 export async function bounds() {
   await askBounds();
   return Object.fromEntries(names()
-    .filter((name) => heldBounds(name) || typed[name]?.some((bound) => bound !== null))
+    .filter((name) => heldBounds(name) || get("bounds")[name]?.some((bound) => bound !== null))
     .map((name) => [name, boundsOf(name)]));
 }
 
@@ -115,8 +113,8 @@ function freeRow(parameter) {
   const free = h("input", {
     type: "checkbox", "aria-label": `${parameter.label} is free`,
     on: { change: () => {
-      if (free.checked) fixed.delete(name);
-      else fixed.add(name);
+      const others = get("fixed").filter((one) => one !== name);
+      set({ fixed: free.checked ? others : [...others, name] });
       show();
     } },
   });
@@ -124,8 +122,9 @@ function freeRow(parameter) {
     const field = h("input", {
       type: "number", step: "any", "aria-label": units.withUnit(`${word} bound of ${parameter.label}`, unit, ", "),
       on: { change: () => {
-        typed[name] ??= [null, null];
-        typed[name][side] = field.value === "" ? null : Number(field.value) / factor;
+        const both = [...get("bounds")[name] ?? [null, null]];
+        both[side] = field.value === "" ? null : Number(field.value) / factor;
+        set({ bounds: { ...get("bounds"), [name]: both } });
         update({ typing: false });
         show();
       } },
@@ -144,9 +143,9 @@ function freeRow(parameter) {
     const both = boundsOf(name);
     const held = heldBounds(name);
     const usual = usualBounds(name);
-    free.checked = !fixed.has(name);
+    free.checked = isFree(name);
     fields.forEach((field, side) => {
-      const own = (typed[name]?.[side] ?? null) !== null;
+      const own = (get("bounds")[name]?.[side] ?? null) !== null;
       if (!typing || field !== document.activeElement) field.value = units.short(both[side] * factor);
       field.disabled = !free.checked;
       field.classList.toggle("own", own);
@@ -178,7 +177,7 @@ function doubtOf(start, [lower, upper]) {
 
 /** Between which values a parameter is searched, SI: as typed, else as usual. */
 function boundsOf(name) {
-  return usualBounds(name).map((value, side) => typed[name]?.[side] ?? value);
+  return usualBounds(name).map((value, side) => get("bounds")[name]?.[side] ?? value);
 }
 
 /** Bounds where none is typed; NaN until the service has told them, and where none follow. */

@@ -6,27 +6,25 @@ import { lacks, nameOf, original } from "./names.js";
 import * as noise from "./noise.js";
 import * as preparation from "./preparation.js";
 import * as search from "./search_form.js";
-import { get } from "./store.js";
+import { get, set } from "./store.js";
 
-const ROLES = { fit: "fit", holdout: "hold out", no: "leave out" };
-/** The role of each run whose use was chosen. */
-const roles = {};
+const USES = { fit: "fit", hold_out: "hold out", leave_out: "leave out" };
 
 /** How a run is used: unless chosen, the ride on show (or the first) is fitted, others held out. */
-function roleOf(run) {
-  if (!run.usable_for_identification) return "no";
-  if (roles[run.id]) return roles[run.id];
+function useOf(run) {
+  if (!run.usable_for_identification) return "leave_out";
+  if (get("use")[run.id]) return get("use")[run.id];
   const usable = get("measurements").filter((m) => m.usable_for_identification);
   const { kind, id } = get("ride");
   const shown = usable.find((m) => kind === "measurement" && m.id === id) ?? usable[0];
   if (run === shown) return "fit";
-  return run.sha256 === shown.sha256 || original(run) ? "no" : "holdout";
+  return run.sha256 === shown.sha256 || original(run) ? "leave_out" : "hold_out";
 }
 
-export const fitted = () => get("measurements").filter((run) => roleOf(run) === "fit");
+export const fitted = () => get("measurements").filter((run) => useOf(run) === "fit");
 
-/** Runs to score that are not fitted: what was fitted under another name is not unseen. */
-export const heldOut = () => unseen(fitted()).filter((run) => roleOf(run) === "holdout");
+/** Runs to score beside those fitted: what was fitted under another name is not unseen. */
+export const heldOut = (seen) => unseen(seen).filter((run) => useOf(run) !== "leave_out");
 
 /** Usable runs with other data than these. */
 export function unseen(seen) {
@@ -53,13 +51,16 @@ export function view(used) {
 }
 
 function runRow(run, used) {
-  const role = roleOf(run);
+  const choose = (value) => {
+    set({ use: { ...get("use"), [run.id]: value } });
+    noise.show(fitted());
+    used();
+  };
   return h("li", {},
     h("span", { className: "run-name", title: nameOf(run.id) }, breakable(nameOf(run.id))),
     run.usable_for_identification
       ? h("span", { className: "run-use" },
-          select(ROLES, role, (value) => { roles[run.id] = value; noise.show(fitted()); used(); },
-            { "aria-label": `Use of ${nameOf(run.id)}` }),
+          select(USES, useOf(run), choose, { "aria-label": `Use of ${nameOf(run.id)}` }),
           h("label", {}, "brakes", preparation.brakingField(run)),
           copied(run))
       : h("span", { className: "badge", title: `${lacks(run)}.` }, "not for fitting"));

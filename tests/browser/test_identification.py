@@ -104,7 +104,7 @@ def test_an_uploaded_file_is_identified(visitor):
     visitor.page.get_by_role("button", name="Use as ride").click()
 
     visitor.click("#tab-identification")
-    for name, role in (("detailed_manoeuvre_1.csv", "holdout"), ("my_ride.csv", "fit")):
+    for name, role in (("detailed_manoeuvre_1.csv", "hold_out"), ("my_ride.csv", "fit")):
         assert visitor.page.get_by_label(f"Use of {name}").input_value() == role
     free_only(visitor, "KF", "CF", "KR", "CR")
     visitor.click("#start")
@@ -224,7 +224,7 @@ def test_files_of_one_name_are_told_apart(visitor):
     visitor.click("#tab-identification")
     for name in rides:
         use = visitor.page.get_by_label(f"Use of {name}", exact=True)
-        use.select_option("holdout" if name == rides[1] else "fit")
+        use.select_option("hold_out" if name == rides[1] else "fit")
     free_only(visitor, "KF")
     visitor.click("#start")
     visitor.until("ridetune.state('fit') !== null", 120)
@@ -256,8 +256,8 @@ def test_the_same_data_is_kept_once_and_never_scored_as_unseen(visitor):
     visitor.click("#tab-identification")
     assert "the same data as detailed_manoeuvre_1.csv" in visitor.element(".runs").inner_text()
     use = visitor.page.get_by_label("Use of copy.csv")
-    assert use.input_value() == "no"
-    use.select_option("holdout")
+    assert use.input_value() == "leave_out"
+    use.select_option("hold_out")
     free_only(visitor, "KF")
     visitor.click("#start")
     visitor.until("ridetune.state('fit') !== null", 120)

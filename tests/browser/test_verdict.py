@@ -21,7 +21,7 @@ def analyst(visitor):
     visitor.page.get_by_role("button", name="Use as ride").click()
     visitor.click("#tab-identification")
     for name in ("detailed_manoeuvre_1.csv", "detailed_manoeuvre_2.csv"):
-        visitor.page.get_by_label(f"Use of {name}").select_option("no")
+        visitor.page.get_by_label(f"Use of {name}").select_option("leave_out")
     return visitor
 
 
