@@ -51,7 +51,8 @@ async function start() {
   units.learn(channels, parameters);
   const { vehicle, measurements: rows } = session;
   const baseline = session.baseline ?? vehicle;
-  set({ parameters, channels, vehicles, manoeuvres, plants, formats, roads, vehicle, baseline, measurements: rows });
+  set({ parameters, channels, vehicles, manoeuvres, plants, formats, roads, vehicle, baseline, measurements: rows,
+    rimsUsual: rimsSettings });
   const usable = rows.find((row) => row.usable_for_identification);
   set({
     ...keeping.taken(session.setup, rimsSettings),

@@ -48,6 +48,7 @@ function said() {
   const asked = get("search");
   const parts = [
     asked.starts !== USUAL.starts && `${asked.starts} starts`,
+    asked.seed !== USUAL.seed && `seed ${asked.seed}`,
     asked.loss !== USUAL.loss && `${LOSSES[asked.loss]} from ${units.plain(asked.loss_scale)} noises`,
   ].filter(Boolean);
   return parts.length ? parts.join(", ") : "one start, least squares";

@@ -20,6 +20,7 @@
 //   fitNoise     the noise of the compared channels is to be found
 //   traction     how a measured ride gets its traction, "exact" or "paper"
 //   rimsSettings   filters and initial state with which recordings drive the model
+//   rimsUsual    those that hold where none are chosen
 //   defaultBounds   {start, bounds}: default bounds of a fit by parameter, and their start values
 //   braking      {measurement id: [[begin, end], ...]} in s, marked by hand
 //   liftOff      wheels may leave the road

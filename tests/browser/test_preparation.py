@@ -23,7 +23,7 @@ def change(visitor: Visitor, label: str, text: str) -> None:
 def test_filters_and_initial_state_act_on_the_ride_and_on_the_fit(visitor):
     """Oracle: the line moves with each choice and comes back with it; the fit keeps them."""
     visitor.click("#tab-identification")
-    visitor.click("text=How recordings drive the model")
+    visitor.click("text=How recordings drive the model: as usual")
     before = visitor.line("chassis.pitch")
     change(visitor, "Low-pass of the wheel centres", "2")
     filtered = visitor.line("chassis.pitch")
@@ -36,6 +36,18 @@ def test_filters_and_initial_state_act_on_the_ride_and_on_the_fit(visitor):
     np.testing.assert_array_equal(visitor.line("chassis.pitch"), before)
 
     change(visitor, "Low-pass of the longitudinal acceleration", "")
+    change(visitor, "High-pass of the compared channels", "0.3")
+    visitor.page.select_option("#traction", "paper")
+    driven = visitor.page.locator("summary", has_text="How recordings drive the model")
+    driven.click()
+    assert driven.inner_text() == (
+        "How recordings drive the model: aₓ unfiltered; z, pitch, roll above 0.3 Hz; "
+        "paper's traction"
+    )
+    driven.click()
+    change(visitor, "High-pass of the compared channels", "")
+    visitor.page.select_option("#traction", "exact")
+    assert driven.inner_text() == "How recordings drive the model: aₓ unfiltered"
     free_only(visitor, "KF")
     visitor.click("#start")
     visitor.until("ridetune.state('fit') !== null", 120)
