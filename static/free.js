@@ -1,7 +1,7 @@
 // Which parameters an identification is free to move, from where and between which bounds.
 
 import * as api from "./api.js";
-import { bend, bent, holds, ofBentDamper, titleOf } from "./controls.js";
+import { holds, ofBentDamper, titleOf } from "./controls.js";
 import { h, symbol } from "./dom.js";
 import * as priors from "./priors.js";
 import * as sensors from "./sensors_form.js";
@@ -13,15 +13,21 @@ const COLUMNS = ["Free", "Parameter", "Start", "Lower", "Upper", "Unit"];
 let rows = [];
 let note = null;
 let body = null;
+let bentDampers = null;
+let known = null;
 
 /** Keep the table's numbers in step with sliders and default bounds. */
 export function build() {
-  on("values defaultBounds fit", () => { if (note) show(); });
+  on("values defaultBounds fit fixed bounds", () => { if (note) show(); });
+  on("fixed", () => { if (note) knowns(); });
 }
+
+const knowns = () => known.replaceChildren(priors.view(shown().map(({ name }) => name), isFree));
 
 function show() {
   if (body.childElementCount !== shown().length) fill();
   rows.forEach((update) => update());
+  bentDampers.checked = damperNames().some(isFree);
   const held = names().some(heldBounds);
   note.textContent = held ? "start at the sliders; yellow: bounds of the applied fit"
     : "start at the sliders; bounds not typed follow";
@@ -29,13 +35,26 @@ function show() {
     "the start, they would let it run on with every fit. Type others, or fix the parameter." : "";
 }
 
-/** The table's rows: of parameters that the sliders' car has. */
+/** The table's rows. */
 function fill() {
+  const within = body.contains(document.activeElement);
   rows = [];
   body.replaceChildren(...shown().map(freeRow));
+  if (within) bentDampers.focus({ preventScroll: true });
+  knowns();
 }
 
-const shown = () => get("parameters").filter(({ name }) => name in get("values"));
+/** Parameters that the sliders' car has, and those of two-slope dampers where any of them is to be found. */
+function shown() {
+  const sought = damperNames().some(isFree);
+  return get("parameters").filter((row) => row.name in get("values") || (sought && ofBentDamper(row)));
+}
+
+/** Where the search begins: at the sliders, for two-slope dampers that the car has not where they are usual. */
+const starts = () => ({
+  ...Object.fromEntries(get("parameters").filter(ofBentDamper).map(({ name, linear_start: start }) => [name, start])),
+  ...get("values"),
+});
 
 export const damperNames = () => get("parameters").filter(ofBentDamper).map(({ name }) => name);
 
@@ -45,25 +64,24 @@ export function holdDampers() {
 }
 
 function dampers() {
-  const box = h("input", {
-    type: "checkbox", id: "two-slope", checked: bent(), on: { change: () => {
-      if (box.checked) set({ fixed: get("fixed").filter((name) => !damperNames().includes(name)) });
+  bentDampers = h("input", {
+    type: "checkbox", id: "two-slope", on: { change: () => {
+      if (bentDampers.checked) set({ fixed: get("fixed").filter((name) => !damperNames().includes(name)) });
       else holdDampers();
-      bend(box.checked);
     } },
   });
   return h("label", {
     className: "inline", title: "Another slope in rebound than in jounce, and a speed at which the " +
-      "force has fallen to half: four more parameters to find. Those of a car that has such dampers " +
-      "are known until they are freed.",
-  }, box, " Two-slope dampers");
+      "force has fallen to half: four more parameters to find. The car on show stays as it is until the " +
+      "fit is applied; where it has such dampers, they are known until they are freed.",
+  }, bentDampers, " Find two-slope dampers");
 }
 
 export function view() {
   askBounds();
   note = h("span", { className: "hint plain", id: "free-note" });
   body = h("tbody");
-  fill();
+  known = h("div");
   const section = h("section", {},
     h("h3", {}, "Free parameters ", note),
     dampers(),
@@ -74,7 +92,7 @@ export function view() {
     h("p", { className: "hint" }, h("span", { className: "mark-own" }, "typed"), " ",
       h("span", { className: "mark-outside" }, "from the applied fit")),
     sensors.view(),
-    priors.view(shown().map(({ name }) => name), isFree));
+    known);
   show();
   return section;
 }
@@ -99,7 +117,7 @@ export function askBounds() {
   asking ??= (async () => {
     while (get("defaultBounds")?.start !== get("values")) {
       const start = get("values");
-      set({ defaultBounds: { start, bounds: await api.defaultBounds(start) } });
+      set({ defaultBounds: { start, bounds: await api.defaultBounds(starts()) } });
     }
   })().catch((error) => {
     if (!error.lost) throw error;
@@ -115,7 +133,6 @@ function freeRow(parameter) {
     on: { change: () => {
       const others = get("fixed").filter((one) => one !== name);
       set({ fixed: free.checked ? others : [...others, name] });
-      show();
     } },
   });
   const fields = ["Lower", "Upper"].map((word, side) => {
@@ -126,7 +143,6 @@ function freeRow(parameter) {
         both[side] = field.value === "" ? null : Number(field.value) / factor;
         set({ bounds: { ...get("bounds"), [name]: both } });
         update({ typing: false });
-        show();
       } },
     });
     return field;
@@ -139,7 +155,7 @@ function freeRow(parameter) {
     begins, fields.map((field) => h("td", {}, field)),
     h("td", { className: "unit" }, unit));
   const update = ({ typing = true } = {}) => {
-    const start = get("values")[name];
+    const start = starts()[name];
     const both = boundsOf(name);
     const held = heldBounds(name);
     const usual = usualBounds(name);

@@ -37,7 +37,7 @@ function row(name, follow) {
   const shown = (value) => (value === null || value === undefined ? "" : units.plain(value * factor, 12));
   const fields = ["Mean", "Standard deviation"].map((word, k) => h("input", {
     type: "number", step: "any", min: k ? "0" : undefined, value: shown(get("priors")[name]?.[k]),
-    placeholder: k ? "" : units.plain(get("values")[name] * factor, 3),
+    placeholder: k ? "" : name in get("values") ? units.plain(get("values")[name] * factor, 3) : "",
     "aria-label": units.withUnit(`${word} of ${label} known before`, unit, ", "),
     on: { change: () => {
       const { [name]: [...both] = [null, null], ...others } = get("priors");
