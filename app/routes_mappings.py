@@ -2,13 +2,16 @@
 by name for the next file.
 """
 
+import json
 from dataclasses import replace
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Body, Query
+from fastapi import APIRouter, Body, Query, Response
 
 from .access import SessionId
 from .columns import columns_to_json, preview
+from .downloads import saved_as
+from .errors import NotFound
 from .recordings import summary
 from .routes_measurements import measurement_to_json
 from .schemas import JsonObject, NamedMapping
@@ -58,6 +61,18 @@ async def columns_preview(
             return preview(table, index, points)
 
     return await services.readers.run(sid, shown)
+
+
+@router.get("/measurements/{mid}/mapping", response_class=Response)
+def mapping(sid: SessionId, mid: str, services: Shared) -> Response:
+    """The mapping that holds, as a file for other recordings and for the command line."""
+    kept = services.store.measurement(sid, mid)
+    if kept.mapping is None:
+        raise NotFound(f"{kept.name} has no mapping; its columns go by their own names.")
+    text = json.dumps(kept.mapping, indent=2, ensure_ascii=False) + "\n"
+    return Response(
+        text, media_type="application/json", headers=saved_as(kept.name, "mapping.json")
+    )
 
 
 @router.put("/measurements/{mid}/mapping")

@@ -11,10 +11,11 @@ from starlette.concurrency import run_in_threadpool
 from ..engine.channels import OUTPUT_CHANNELS
 from ..engine.errors import ManoeuvreError, MeasurementError
 from ..engine.json_text import parse_json
-from ..engine.run_notes import parse_notes
+from ..engine.run_notes import notes_of, parse_notes
 from ..engine.step_record import step_record_to_json
 from . import frames
 from .access import SessionId
+from .downloads import saved_as
 from .recordings import summary
 from .routes_simulations import FORMS, csv_reply, frames_reply
 from .services import Services, Shared
@@ -109,6 +110,29 @@ async def histories(
     if services.recordings.remembers(kept):
         return await run_in_threadpool(shown)
     return await services.readers.run(sid, shown)
+
+
+@router.get("/{mid}/run.csv", response_class=Response)
+async def as_csv(sid: SessionId, mid: str, services: Shared) -> Response:
+    """The recording as it is used, in SI and by our channels' names, as a file."""
+    kept = services.store.measurement(sid, mid)
+
+    def written() -> Response:
+        reply = csv_reply(services.recordings.run(kept))
+        reply.headers.update(saved_as(kept.name, "run.csv"))
+        return reply
+
+    return await services.readers.run(sid, written)
+
+
+@router.get("/{mid}/run.toml", response_class=Response)
+async def its_notes(sid: SessionId, mid: str, services: Shared) -> Response:
+    """The notes that belong beside `run.csv`: its noise, and what was done to it."""
+    kept = services.store.measurement(sid, mid)
+    run = await services.readers.run(sid, lambda: services.recordings.run(kept))
+    return Response(
+        notes_of(run), media_type="application/toml", headers=saved_as(kept.name, "run.toml")
+    )
 
 
 @router.get("/{mid}/original", response_class=FileResponse)

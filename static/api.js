@@ -133,6 +133,10 @@ export const forgetManoeuvre = (id) => json("DELETE", `${base}/measurements/${id
 const attach = (id, what, file) =>
   json("PUT", `${base}/measurements/${id}/${what}`, { body: inForm(file) });
 export const originalUrl = (id) => `${base}/measurements/${id}/original`;
+/** The recording as it is used, in SI; its notes; which of the file's columns are which channels. */
+export const runUrl = (id) => `${base}/measurements/${id}/run.csv`;
+export const notesUrl = (id) => `${base}/measurements/${id}/run.toml`;
+export const mappingUrl = (id) => `${base}/measurements/${id}/mapping`;
 export function measurement(id, channelNames, maxSamples, decimate = "stride", conditioned = true) {
   const query = new URLSearchParams({ max_samples: maxSamples, decimate, conditioned });
   if (channelNames) query.set("channels", channelNames.join(","));
