@@ -45,6 +45,10 @@ def test_a_fit_tells_what_its_run_determines_and_what_to_drive_next(analyst):
     assert f"{rate['value'] / 1000:.4g} N/mm" in said
     assert visitor.element(".direction").first.inner_text()
 
+    # Of a single start there are no minima to compare, and it is told how to get some.
+    page.locator("#fit-minima").click()
+    assert "from one start" in visitor.element("#identification").inner_text()
+
     # The pair is marked by more than its colour, and read by the keyboard.
     page.locator("#fit-correlation").click()
     names = [one["name"] for one in fit["parameters"]]
