@@ -7,8 +7,8 @@ from fastapi import APIRouter, Body, Request, Response
 from ..engine.vehicle_file import vehicle_from_json, vehicle_to_json
 from .access import COOKIE, SessionId, bearer, give_session, require_service_token
 from .job_routes import all_to_json
+from .measurement_view import measurements_to_json
 from .routes_identifications import VIEW as IDENTIFICATION
-from .routes_measurements import measurement_to_json
 from .routes_sweeps import VIEW as SWEEP
 from .schemas import JsonObject, SetupForm
 from .services import Shared
@@ -36,7 +36,7 @@ def read(sid: SessionId, services: Shared) -> dict[str, Any]:
         "vehicle": session.vehicle,
         "baseline": session.baseline,
         "setup": session.setup,
-        "measurements": [measurement_to_json(kept) for kept in services.store.measurements(sid)],
+        "measurements": measurements_to_json(services.store, sid),
         "identifications": all_to_json(services, sid, IDENTIFICATION),
         "sweeps": all_to_json(services, sid, SWEEP),
     }

@@ -154,7 +154,7 @@ function show() {
             "Cancel")
         : h("button", { type: "button", id: "start", className: "primary", on: { click: start } },
             "Identify")),
-    view === "setup" ? setup.view(saidOfRuns) : fit.view(current(), holdouts, { ...hooks, offer }),
+    view === "setup" ? setup.view(show) : fit.view(current(), holdouts, { ...hooks, offer }),
   ), "#start, #cancel");
   saidOfRuns();
   advance();

@@ -123,6 +123,12 @@ async function take(file) {
   }
   set({ measurements: [...get("measurements"), row] });
   selected = row.id;
+  const first = original(row);
+  if (first) {
+    notice("warning", `${nameOf(row.id)} holds the same data as ${nameOf(first.id)}`,
+      "It is kept, and left out of fits until its use is chosen; fitted beside the other it would count twice.");
+    return;
+  }
   const { length } = row.warnings;
   if (nextStage(row) !== "ready") {
     const stage = nextStage(row);

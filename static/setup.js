@@ -2,7 +2,7 @@
 
 import { breakable, h } from "./dom.js";
 import * as free from "./free.js";
-import { lacks, nameOf, original } from "./names.js";
+import { dataOf, lacks, nameOf, original } from "./names.js";
 import * as noise from "./noise.js";
 import * as preparation from "./preparation.js";
 import * as search from "./search_form.js";
@@ -18,7 +18,7 @@ function useOf(run) {
   const { kind, id } = get("ride");
   const shown = usable.find((m) => kind === "measurement" && m.id === id) ?? usable[0];
   if (run === shown) return "fit";
-  return run.sha256 === shown.sha256 || original(run) ? "leave_out" : "hold_out";
+  return dataOf(run) === dataOf(shown) || original(run) ? "leave_out" : "hold_out";
 }
 
 export const fitted = () => get("measurements").filter((run) => useOf(run) === "fit");
@@ -28,8 +28,8 @@ export const heldOut = (seen) => unseen(seen).filter((run) => useOf(run) !== "le
 
 /** Usable runs with other data than these. */
 export function unseen(seen) {
-  const data = new Set(seen.map(({ sha256 }) => sha256));
-  return get("measurements").filter((run) => run.usable_for_identification && !data.has(run.sha256));
+  const data = new Set(seen.map(dataOf));
+  return get("measurements").filter((run) => run.usable_for_identification && !data.has(dataOf(run)));
 }
 
 /** The set-up; `used()` is called when the use of a run has changed. */
@@ -53,7 +53,6 @@ export function view(used) {
 function runRow(run, used) {
   const choose = (value) => {
     set({ use: { ...get("use"), [run.id]: value } });
-    noise.show(fitted());
     used();
   };
   return h("li", {},
@@ -68,7 +67,10 @@ function runRow(run, used) {
 
 function copied(run) {
   const first = original(run);
-  return first ? h("span", { className: "hint" }, "the same data as ", breakable(nameOf(first.id))) : null;
+  if (!first) return null;
+  const twice = useOf(first) === "fit" && useOf(run) === "fit";
+  return h("span", { className: twice ? "worse" : "hint" }, "the same data as ", breakable(nameOf(first.id)),
+    twice ? ", which so counts twice" : "");
 }
 
 function select(options, value, change, properties) {

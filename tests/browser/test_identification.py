@@ -266,6 +266,26 @@ def test_the_same_data_is_kept_once_and_never_scored_as_unseen(visitor):
     assert "detailed_manoeuvre_2" in scored[0].replace("\n", "")
 
 
+def test_the_same_drive_written_otherwise_is_told_and_left_out(visitor):
+    visitor.click("#tab-measurements")
+    data = (SAMPLES / "detailed/manoeuvre_1.csv").read_bytes()
+    add_file(visitor, "windows.csv", data.replace(b"\n", b"\r\n"))
+    notice = visitor.element(".notice")
+    visitor.wait(notice.is_visible, "it is told")
+    told = "windows.csv holds the same data as detailed_manoeuvre_1.csv"
+    assert told in notice.inner_text()
+    assert visitor.look("ridetune.state('measurements').length") == 3
+    visitor.click("#tab-identification")
+    use = visitor.page.get_by_label("Use of windows.csv")
+    assert use.input_value() == "leave_out"
+    runs = visitor.element(".runs")
+    assert "counts twice" not in runs.inner_text()
+    use.focus()
+    use.select_option("fit")
+    assert "which so counts twice" in runs.inner_text()
+    assert use.evaluate("(field) => field === document.activeElement")
+
+
 def test_an_upload_with_warnings_leads_to_them(visitor):
     """Millimetres taken for metres: the file has all channels, and three doubts about them."""
     visitor.click("#tab-measurements")
