@@ -1,5 +1,7 @@
 """What a fit is worth, on the page: verdict, correlation, profile, next run, error band, search."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -148,8 +150,15 @@ def test_a_search_is_told_of_starts_outliers_and_priors(analyst):
     assert summaries["Search"].inner_text() == "Search: 8 starts, Huber from 3 noises"
     assert summaries["Known before"].inner_text().replace("\n", "") == "Known before: dR"
 
-    fit = fitted(visitor)
-    job = visitor.look("ridetune.job()")
+    # While it runs, it tells which search it is at and how long the others take.
+    visitor.click("#start")
+    stage = page.locator("#stage-of-fit")
+    told = re.compile(r"Search [3-8] of [3-8], .* best of 8 starts; about \d+ s left\.")
+    visitor.wait(
+        lambda: any(told.match(text) for text in stage.all_inner_texts()), "the search is told"
+    )
+    visitor.until("ridetune.state('fit') !== null", 150)
+    fit, job = visitor.look("ridetune.state('fit')"), visitor.look("ridetune.job()")
     assert (job["starts"], job["loss"]) == (8, "huber")
     assert job["priors"] == {"rear.pivot.distance": [1.1, 0.05]}
     page.locator("#fit-minima").click()
