@@ -104,13 +104,18 @@ def build_problem(spec: Mapping[str, Any], runs: list[Run]) -> Any:
 
 def identify_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -> dict[str, Any]:
     """On the worker: fit, reporting after every evaluation; the fit as JSON."""
+    from ..engine.identification.fit import Stage
     from ..engine.identification.fit_file import fit_to_json
     from ..engine.identification.identify import identify
+    from .time_left import SearchClock
 
+    problem = build_problem(payload, payload["runs"])
     costs: list[float] = []
+    clock = SearchClock(noise_follows=problem.sensors.finds_noise)
 
     def progress(now: Any) -> None:
-        costs.append(now.cost)
+        if now.stage != Stage.SCREENING:
+            costs.append(now.cost)
         report(
             {
                 "cost": now.cost,
@@ -119,13 +124,15 @@ def identify_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -
                 "evaluations": now.evaluations,
                 "parameters": dict(now.parameters),
                 "fit_percent": {run: dict(of) for run, of in now.fit_percent.items()},
+                "stage": now.stage.value,
                 "search": now.search,
                 "searches": now.searches,
+                "seconds_left": clock.left(now),
             }
         )
 
     fit = identify(
-        build_problem(payload, payload["runs"]),
+        problem,
         progress=progress,
         cancelled=cancelled,
         starts=payload["starts"],

@@ -6,6 +6,7 @@ own is kept, too, and is no run until it has a mapping. Whoever reads a file her
 child may be started, so that there are never more of them than the settings allow.
 """
 
+import hashlib
 import json
 import threading
 from collections.abc import Iterable, Iterator, Mapping
@@ -160,6 +161,11 @@ class Recordings:
         with self.table(measurement) as table:
             return _by_names(table, measurement.noise)
 
+    def summed_up(self, measurement: Measurement) -> dict[str, Any]:
+        """Summary of a measurement as it is used."""
+        found = summary(self.run(measurement), measurement.mapping)
+        return {**found, "data_sha256": _digest(self.raw(measurement))}
+
     @contextmanager
     def _opened(self, path: Path, name: str) -> "Iterator[ChildTable]":
         """A stranger's file, opened once a child may be started."""
@@ -299,6 +305,7 @@ def summary(run: Run, mapping: Mapping[str, Any] | None = None) -> dict[str, Any
         "usable_for_identification": not missing,
         "missing": missing,
         "sign_suggestions": suggestions,
+        "data_sha256": _digest(run),
     }
 
 
@@ -324,6 +331,15 @@ def _unmapped_summary(table: "Table", reason: MeasurementError) -> dict[str, Any
         "missing": list(missing_for_identification(Run(found.source, nothing, guessed))),
         "sign_suggestions": [],
     }
+
+
+def _digest(run: Run) -> str:
+    """What stands for a run's samples, however its file writes them."""
+    made = hashlib.sha256()
+    for name in ("time", *sorted(run.columns)):
+        made.update(name.encode())
+        made.update(np.ascontiguousarray(run[name], dtype=float).tobytes())
+    return made.hexdigest()
 
 
 def _channel(name: str, run: Run) -> Mapping[str, Any]:

@@ -6,8 +6,7 @@ from typing import Any
 from fastapi import APIRouter
 
 from .access import SessionId
-from .recordings import summary
-from .routes_measurements import measurement_to_json
+from .measurement_view import measurement_to_json
 from .schemas import ConditioningRequest
 from .services import Services, Shared
 from .store import Measurement
@@ -51,7 +50,7 @@ def _condition(services: Services, sid: str, mid: str, body: ConditioningRequest
             vehicle = vehicle_to_json(vehicle_from_json(told))
         asked = {"steps": steps_to_json(steps), "vehicle": vehicle}
     done = replace(kept, conditioning=asked)
-    found = summary(services.recordings.run(done), kept.mapping)
+    found = services.recordings.summed_up(done)
     return _shown(services, sid, services.store.set_conditioning(sid, kept.id, asked, found))
 
 
@@ -75,5 +74,5 @@ def _shown(services: Services, sid: str, kept: Measurement) -> dict[str, Any]:
             "lacks": list(found.lacks),
             "output_highpass_hz": found.output_highpass_hz,
         },
-        "measurement": measurement_to_json(kept),
+        "measurement": measurement_to_json(services.store, sid, kept),
     }

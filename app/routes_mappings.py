@@ -2,15 +2,17 @@
 by name for the next file.
 """
 
+import json
 from dataclasses import replace
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Body, Query
+from fastapi import APIRouter, Body, Query, Response
 
 from .access import SessionId
 from .columns import columns_to_json, preview
-from .recordings import summary
-from .routes_measurements import measurement_to_json
+from .downloads import saved_as
+from .errors import NotFound
+from .measurement_view import measurement_to_json
 from .schemas import JsonObject, NamedMapping
 from .services import Services, Shared
 from .store import Measurement
@@ -60,13 +62,25 @@ async def columns_preview(
     return await services.readers.run(sid, shown)
 
 
+@router.get("/measurements/{mid}/mapping", response_class=Response)
+def mapping(sid: SessionId, mid: str, services: Shared) -> Response:
+    """The mapping that holds, as a file for other recordings and for the command line."""
+    kept = services.store.measurement(sid, mid)
+    if kept.mapping is None:
+        raise NotFound(f"{kept.name} has no mapping; its columns go by their own names.")
+    text = json.dumps(kept.mapping, indent=2, ensure_ascii=False) + "\n"
+    return Response(
+        text, media_type="application/json", headers=saved_as(kept.name, "mapping.json")
+    )
+
+
 @router.put("/measurements/{mid}/mapping")
 async def set_mapping(
     sid: SessionId, mid: str, services: Shared, body: MappingBody
 ) -> dict[str, Any]:
     """Take a file's columns for channels; refused while a job reads it."""
     mapped = await services.readers.run(sid, lambda: _map(services, sid, mid, body))
-    return measurement_to_json(mapped)
+    return measurement_to_json(services.store, sid, mapped)
 
 
 def _map(services: Services, sid: str, mid: str, body: JsonObject) -> Measurement:
@@ -77,7 +91,7 @@ def _map(services: Services, sid: str, mid: str, body: JsonObject) -> Measuremen
     mapping = mapping_to_json(mapping_from_json(body, "mapping"))
     mapped = replace(kept, mapping=mapping)
     noise = dict(services.recordings.parse(mapped, kept.noise).noise)
-    found = summary(services.recordings.run(replace(mapped, noise=noise)), mapping)
+    found = services.recordings.summed_up(replace(mapped, noise=noise))
     return services.store.set_mapping(sid, kept.id, mapping, noise, found)
 
 
@@ -91,10 +105,11 @@ async def forget_mapping(sid: SessionId, mid: str, services: Shared) -> dict[str
         found, noise = services.recordings.by_names(kept)
         if not found["needs_mapping"]:
             bare = replace(kept, mapping=None, noise=noise, summary=found)
-            found = summary(services.recordings.run(bare))
+            found = services.recordings.summed_up(bare)
         return services.store.set_mapping(sid, kept.id, None, noise, found)
 
-    return measurement_to_json(await services.readers.run(sid, by_names))
+    named = await services.readers.run(sid, by_names)
+    return measurement_to_json(services.store, sid, named)
 
 
 @router.get("/mappings")

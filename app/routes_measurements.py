@@ -1,7 +1,6 @@
 """Measurements: upload, list, look at, take back byte for byte, delete."""
 
 from dataclasses import replace
-from datetime import UTC, datetime
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Request, Response
@@ -11,11 +10,12 @@ from starlette.concurrency import run_in_threadpool
 from ..engine.channels import OUTPUT_CHANNELS
 from ..engine.errors import ManoeuvreError, MeasurementError
 from ..engine.json_text import parse_json
-from ..engine.run_notes import parse_notes
+from ..engine.run_notes import notes_of, parse_notes
 from ..engine.step_record import step_record_to_json
 from . import frames
 from .access import SessionId
-from .recordings import summary
+from .downloads import saved_as
+from .measurement_view import measurement_to_json, measurements_to_json
 from .routes_simulations import FORMS, csv_reply, frames_reply
 from .services import Services, Shared
 from .store import Measurement
@@ -31,31 +31,11 @@ Notes = Annotated[Upload, Depends(receive("notes.toml"))]
 Driven = Annotated[Upload, Depends(receive("manoeuvre.json"))]
 
 
-def measurement_to_json(kept: Measurement) -> dict[str, Any]:
-    """A measurement as the REST interface shows it."""
-    return {
-        "id": kept.id,
-        "name": kept.name,
-        "bytes": kept.bytes,
-        "sha256": kept.sha256,
-        "created": datetime.fromtimestamp(kept.created, UTC).isoformat(),
-        "sample": kept.sample,
-        "noise": kept.noise,
-        "manoeuvre": kept.manoeuvre,
-        "conditioning": kept.conditioning and kept.conditioning["steps"],
-        "conditioned": kept.conditioned,
-        "mapping": kept.mapping,
-        "needs_mapping": False,
-        "sign_suggestions": [],
-        **kept.summary,
-    }
-
-
 @router.post("", status_code=201, openapi_extra=openapi("text/csv", "application/octet-stream"))
 async def upload(sid: SessionId, services: Shared, received: Recording) -> dict[str, Any]:
     """Upload a recording of any kind: a form with the part `file`, or the bare file with ?name=."""
     kept = await services.readers.run(sid, lambda: _keep(services, sid, received))
-    return measurement_to_json(kept)
+    return measurement_to_json(services.store, sid, kept)
 
 
 def _keep(services: Services, sid: str, received: Upload) -> Measurement:
@@ -66,13 +46,13 @@ def _keep(services: Services, sid: str, received: Upload) -> Measurement:
 @router.get("")
 def all_of_session(sid: SessionId, services: Shared) -> list[dict[str, Any]]:
     """The session's measurements, oldest first."""
-    return [measurement_to_json(kept) for kept in services.store.measurements(sid)]
+    return measurements_to_json(services.store, sid)
 
 
 @router.get("/{mid}")
 def one(sid: SessionId, mid: str, services: Shared) -> dict[str, Any]:
     """One measurement: what was found in it."""
-    return measurement_to_json(services.store.measurement(sid, mid))
+    return measurement_to_json(services.store, sid, services.store.measurement(sid, mid))
 
 
 @router.get("/{mid}/frames", responses=FORMS, response_class=Response)
@@ -111,6 +91,29 @@ async def histories(
     return await services.readers.run(sid, shown)
 
 
+@router.get("/{mid}/run.csv", response_class=Response)
+async def as_csv(sid: SessionId, mid: str, services: Shared) -> Response:
+    """The recording as it is used, in SI and by our channels' names, as a file."""
+    kept = services.store.measurement(sid, mid)
+
+    def written() -> Response:
+        reply = csv_reply(services.recordings.run(kept))
+        reply.headers.update(saved_as(kept.name, "run.csv"))
+        return reply
+
+    return await services.readers.run(sid, written)
+
+
+@router.get("/{mid}/run.toml", response_class=Response)
+async def its_notes(sid: SessionId, mid: str, services: Shared) -> Response:
+    """The notes that belong beside `run.csv`: its noise, and what was done to it."""
+    kept = services.store.measurement(sid, mid)
+    run = await services.readers.run(sid, lambda: services.recordings.run(kept))
+    return Response(
+        notes_of(run), media_type="application/toml", headers=saved_as(kept.name, "run.toml")
+    )
+
+
 @router.get("/{mid}/original", response_class=FileResponse)
 def original(sid: SessionId, mid: str, services: Shared) -> FileResponse:
     """The uploaded file, byte for byte."""
@@ -126,7 +129,7 @@ def original(sid: SessionId, mid: str, services: Shared) -> FileResponse:
 async def set_notes(sid: SessionId, mid: str, services: Shared, received: Notes) -> dict[str, Any]:
     """Take a recording's noise, and what was done to it, from a NAME.toml as it lies beside it."""
     noted = await services.readers.run(sid, lambda: _note(services, sid, mid, received))
-    return measurement_to_json(noted)
+    return measurement_to_json(services.store, sid, noted)
 
 
 def _note(services: Services, sid: str, mid: str, received: Upload) -> Measurement:
@@ -143,7 +146,7 @@ def _note(services: Services, sid: str, mid: str, received: Upload) -> Measureme
         return services.store.set_notes(sid, kept.id, noise, done, kept.summary)
     known = dict(services.recordings.parse(kept, noise).noise)
     noted = replace(kept, noise=known, conditioned=done or None)
-    found = summary(services.recordings.run(noted), kept.mapping)
+    found = services.recordings.summed_up(noted)
     return services.store.set_notes(sid, kept.id, known, done, found)
 
 
@@ -154,7 +157,7 @@ async def set_manoeuvre(
     """Take what was driven from a manoeuvre file, as the NAME.manoeuvre.json beside it."""
     services.store.measurement(sid, mid)
     driven = await run_in_threadpool(_driven, services, received)
-    return measurement_to_json(services.store.set_manoeuvre(sid, mid, driven))
+    return measurement_to_json(services.store, sid, services.store.set_manoeuvre(sid, mid, driven))
 
 
 def _driven(services: Services, received: Upload) -> dict[str, Any]:
@@ -174,7 +177,7 @@ def _driven(services: Services, received: Upload) -> dict[str, Any]:
 def forget_manoeuvre(sid: SessionId, mid: str, services: Shared) -> dict[str, Any]:
     """What was driven is not known."""
     services.store.measurement(sid, mid)
-    return measurement_to_json(services.store.set_manoeuvre(sid, mid, None))
+    return measurement_to_json(services.store, sid, services.store.set_manoeuvre(sid, mid, None))
 
 
 @router.delete("/{mid}", status_code=204)

@@ -7,10 +7,10 @@ from fastapi import APIRouter, Body, Request, Response
 from ..engine.vehicle_file import vehicle_from_json, vehicle_to_json
 from .access import COOKIE, SessionId, bearer, give_session, require_service_token
 from .job_routes import all_to_json
+from .measurement_view import measurements_to_json
 from .routes_identifications import VIEW as IDENTIFICATION
-from .routes_measurements import measurement_to_json
 from .routes_sweeps import VIEW as SWEEP
-from .schemas import JsonObject
+from .schemas import JsonObject, SetupForm
 from .services import Shared
 from .strict_json import StrictRoute
 
@@ -35,7 +35,8 @@ def read(sid: SessionId, services: Shared) -> dict[str, Any]:
         "id": sid,
         "vehicle": session.vehicle,
         "baseline": session.baseline,
-        "measurements": [measurement_to_json(kept) for kept in services.store.measurements(sid)],
+        "setup": session.setup,
+        "measurements": measurements_to_json(services.store, sid),
         "identifications": all_to_json(services, sid, IDENTIFICATION),
         "sweeps": all_to_json(services, sid, SWEEP),
     }
@@ -77,3 +78,17 @@ def set_baseline(sid: SessionId, services: Shared, body: VehicleBody) -> dict[st
     checked = vehicle_to_json(vehicle_from_json(body))
     services.store.set_baseline(sid, checked)
     return checked
+
+
+@router.get("/{sid}/setup")
+def setup(sid: SessionId, services: Shared) -> dict[str, Any] | None:
+    """What the page will ask of the next identification; null while nothing was chosen."""
+    return services.store.session(sid).setup
+
+
+@router.put("/{sid}/setup")
+def set_setup(sid: SessionId, services: Shared, body: SetupForm) -> dict[str, Any]:
+    """Replace it; what it names need not be there any more."""
+    kept = body.model_dump(mode="json")
+    services.store.set_setup(sid, kept)
+    return kept

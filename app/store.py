@@ -32,11 +32,15 @@ UNUSED_AFTER = 3600.0
 
 @dataclass(frozen=True)
 class Session:
-    """One visitor's workspace: the car being tuned and the car it is compared with, as JSON."""
+    """One visitor's workspace: the car being tuned and the car it is compared with, as JSON.
+
+    setup : what the next identification is told, None while nothing was chosen
+    """
 
     id: str
     vehicle: dict[str, Any]
     baseline: dict[str, Any]
+    setup: dict[str, Any] | None
 
 
 @dataclass(frozen=True)
@@ -156,11 +160,18 @@ class Store:
         """The workspace."""
         with self.database.reading() as connection:
             row = connection.execute(
-                select(sessions.c.vehicle, sessions.c.baseline).where(sessions.c.id == session)
+                select(sessions.c.vehicle, sessions.c.baseline, sessions.c.setup).where(
+                    sessions.c.id == session
+                )
             ).one_or_none()
         if row is None:
             raise NotFound("The session has been deleted; open the start page for a new one.")
-        return Session(session, json.loads(row.vehicle), json.loads(row.baseline))
+        return Session(
+            session,
+            json.loads(row.vehicle),
+            json.loads(row.baseline),
+            row.setup and json.loads(row.setup),
+        )
 
     def set_vehicle(self, session: str, vehicle: Mapping[str, Any]) -> None:
         """Replace the car being tuned."""
@@ -169,6 +180,10 @@ class Store:
     def set_baseline(self, session: str, vehicle: Mapping[str, Any]) -> None:
         """Replace the car it is compared with."""
         self._set(session, baseline=json.dumps(vehicle), used=True)
+
+    def set_setup(self, session: str, setup: Mapping[str, Any]) -> None:
+        """Replace what the next identification is told."""
+        self._set(session, setup=json.dumps(dict(setup)), used=True)
 
     def _set(self, session: str, **values: Any) -> None:
         with self.database.writing() as connection:

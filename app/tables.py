@@ -26,6 +26,7 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         "ALTER TABLE measurements ADD COLUMN conditioning TEXT",
     ),
     ("ALTER TABLE measurements ADD COLUMN conditioned TEXT",),
+    ("ALTER TABLE sessions ADD COLUMN setup TEXT",),
 )
 """What leads from each version of the schema, the first being 1, to the next."""
 
@@ -52,6 +53,7 @@ sessions = Table(
     Column("used", Boolean, nullable=False, default=False),
     Column("vehicle", Text, nullable=False),
     Column("baseline", Text, nullable=False),
+    Column("setup", Text),
 )
 
 uploads = Table(

@@ -111,6 +111,7 @@ export const session = () => json("GET", base);
 /** Outlives the page, so that leaving it does not lose the last move. */
 export const saveVehicle = (vehicle) =>
   json("PUT", `${base}/vehicle`, { body: vehicle, keepalive: true });
+export const saveSetup = (setup) => json("PUT", `${base}/setup`, { body: setup, keepalive: true });
 export const saveBaseline = (vehicle) => json("PUT", `${base}/baseline`, { body: vehicle });
 export const simulate = (body) =>
   frames("POST", `${base}/simulations`, { body, accept: FRAMES });
@@ -132,6 +133,10 @@ export const forgetManoeuvre = (id) => json("DELETE", `${base}/measurements/${id
 const attach = (id, what, file) =>
   json("PUT", `${base}/measurements/${id}/${what}`, { body: inForm(file) });
 export const originalUrl = (id) => `${base}/measurements/${id}/original`;
+/** The recording as it is used, in SI; its notes; which of the file's columns are which channels. */
+export const runUrl = (id) => `${base}/measurements/${id}/run.csv`;
+export const notesUrl = (id) => `${base}/measurements/${id}/run.toml`;
+export const mappingUrl = (id) => `${base}/measurements/${id}/mapping`;
 export function measurement(id, channelNames, maxSamples, decimate = "stride", conditioned = true) {
   const query = new URLSearchParams({ max_samples: maxSamples, decimate, conditioned });
   if (channelNames) query.set("channels", channelNames.join(","));

@@ -30,8 +30,10 @@ export async function open(row, itsHost) {
   parts.side = h("div", { className: "conditioning-side" });
   parts.apply = h("button", { type: "button", id: "apply-steps", on: { click: () => apply(at.steps) } }, "Apply");
   parts.undo = h("button", { type: "button", id: "as-recorded", on: { click: () => apply([]) } }, "As recorded");
+  parts.download = h("a", { className: "button", download: "", href: api.runUrl(row.id),
+    title: "The recording as it is conditioned, in SI" }, "Download CSV");
   parts.next = h("span");
-  host.tools(parts.undo, parts.next, parts.apply);
+  host.tools(parts.download, parts.undo, parts.next, parts.apply);
   show();
   return h("div", { className: "conditioning" },
     h("div", { className: "conditioning-steps scrolls" }, parts.head, parts.steps, adding()), parts.side);
@@ -69,6 +71,7 @@ function tools() {
   parts.apply.classList.toggle("primary", !applied);
   parts.apply.disabled = applied && !at.vehicle;
   parts.undo.hidden = !at.applied.length;
+  parts.download.hidden = !at.applied.length || !applied;
   parts.next.replaceChildren(...[applied && (at.row.usable_for_identification || !at.steps.length)
     ? host.next(at.row) : null].filter(Boolean));
 }

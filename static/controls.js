@@ -17,6 +17,7 @@ export const DETERMINED = {
   no: "not determined",
 };
 const rows = new Map();
+let twoSlope = null;
 /** The number that was typed last, until a car with it has been simulated: {parameter, before}. */
 let entered = null;
 
@@ -50,7 +51,7 @@ export const valuesOf = (vehicle) => Object.fromEntries(get("parameters")
 /** Whether a parameter is one of two-slope dampers. */
 export const ofBentDamper = ({ linear_start }) => linear_start !== null;
 
-export const bent = () => get("parameters").some((row) => ofBentDamper(row) && row.name in get("values"));
+const bent = () => get("parameters").some((row) => ofBentDamper(row) && row.name in get("values"));
 
 /** The vehicle with linear dampers. */
 export function straightened(vehicle) {
@@ -72,7 +73,7 @@ export function isOfThisCar(fit) {
 }
 
 /** Give the sliders' car dampers with two slopes and a knee, or linear ones. */
-export function bend(wanted) {
+function bend(wanted) {
   const rows = get("parameters").filter(ofBentDamper);
   const values = { ...get("values") };
   for (const { name, linear_start } of rows) {
@@ -112,7 +113,10 @@ export function build({ onBaseline }) {
     }
     panel.append(group);
   }
+  twoSlope = h("input", { type: "checkbox", id: "bent", on: { change: () => bend(twoSlope.checked) } });
   panel.append(
+    h("label", { className: "inline", title: "Give the car dampers with another slope in rebound than in jounce, and " +
+      "a speed at which the force has fallen to half; or linear ones" }, twoSlope, " Two-slope dampers"),
     h("p", { className: "track-legend" },
       h("span", { className: "mark-baseline" }, "baseline"),
       h("span", { className: "mark-interval" }, "95 % interval of the fit")),
@@ -270,6 +274,7 @@ function nudge(event, slider, step, lower, upper, change) {
 function show() {
   const values = get("values");
   const baseline = get("baseline");
+  twoSlope.checked = bent();
   const fit = isOfThisCar(get("fit")) ? get("fit") : null;
   const estimates = new Map((fit?.parameters ?? []).map((p) => [p.name, p]));
   let changed = 0;

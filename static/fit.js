@@ -13,7 +13,7 @@ const VIEWS = {
   verdict: { title: "Verdict", view: (job) => verdict.view(job.result) },
   correlation: { title: "Correlation", view: (job) => correlation.view(job.result) },
   residuals: { title: "Residuals", view: residuals.view },
-  minima: { title: "Minima", is: ({ result: { starts } }) => starts > 1, view: residuals.minima },
+  minima: { title: "Minima", view: residuals.minima },
   profile: { title: "Profile", is: profile.asked, view: profile.view },
   advice: { title: "Next run", is: ({ result: { converged } }) => converged, view: advice.view },
 };

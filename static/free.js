@@ -1,7 +1,7 @@
 // Which parameters an identification is free to move, from where and between which bounds.
 
 import * as api from "./api.js";
-import { bend, bent, holds, ofBentDamper, titleOf } from "./controls.js";
+import { holds, ofBentDamper, titleOf } from "./controls.js";
 import { h, symbol } from "./dom.js";
 import * as priors from "./priors.js";
 import * as sensors from "./sensors_form.js";
@@ -9,23 +9,25 @@ import { get, on, set } from "./store.js";
 import * as units from "./units.js";
 
 const COLUMNS = ["Free", "Parameter", "Start", "Lower", "Upper", "Unit"];
-const fixed = new Set();
-/** Typed bounds, {name: [SI or null, SI or null]}. */
-const typed = {};
 /** What brings each row up to date with sliders and bounds. */
 let rows = [];
 let note = null;
 let body = null;
+let bentDampers = null;
+let known = null;
 
 /** Keep the table's numbers in step with sliders and default bounds. */
 export function build() {
-  holdDampers();
-  on("values defaultBounds fit", () => { if (note) show(); });
+  on("values defaultBounds fit fixed bounds", () => { if (note) show(); });
+  on("fixed", () => { if (note) knowns(); });
 }
+
+const knowns = () => known.replaceChildren(priors.view(shown().map(({ name }) => name), isFree));
 
 function show() {
   if (body.childElementCount !== shown().length) fill();
   rows.forEach((update) => update());
+  bentDampers.checked = damperNames().some(isFree);
   const held = names().some(heldBounds);
   note.textContent = held ? "start at the sliders; yellow: bounds of the applied fit"
     : "start at the sliders; bounds not typed follow";
@@ -33,41 +35,53 @@ function show() {
     "the start, they would let it run on with every fit. Type others, or fix the parameter." : "";
 }
 
-/** The table's rows: of parameters that the sliders' car has. */
+/** The table's rows. */
 function fill() {
+  const within = body.contains(document.activeElement);
   rows = [];
   body.replaceChildren(...shown().map(freeRow));
+  if (within) bentDampers.focus({ preventScroll: true });
+  knowns();
 }
 
-const shown = () => get("parameters").filter(({ name }) => name in get("values"));
+/** Parameters that the sliders' car has, and those of two-slope dampers where any of them is to be found. */
+function shown() {
+  const sought = damperNames().some(isFree);
+  return get("parameters").filter((row) => row.name in get("values") || (sought && ofBentDamper(row)));
+}
 
-const damperNames = () => get("parameters").filter(ofBentDamper).map(({ name }) => name);
+/** Where the search begins: at the sliders, for two-slope dampers that the car has not where they are usual. */
+const starts = () => ({
+  ...Object.fromEntries(get("parameters").filter(ofBentDamper).map(({ name, linear_start: start }) => [name, start])),
+  ...get("values"),
+});
+
+export const damperNames = () => get("parameters").filter(ofBentDamper).map(({ name }) => name);
 
 /** The dampers that a car brings along are known, as its masses are, until they are freed here. */
 export function holdDampers() {
-  damperNames().forEach((name) => fixed.add(name));
+  set({ fixed: [...new Set([...get("fixed"), ...damperNames()])] });
 }
 
 function dampers() {
-  const box = h("input", {
-    type: "checkbox", id: "two-slope", checked: bent(), on: { change: () => {
-      if (box.checked) damperNames().forEach((name) => fixed.delete(name));
+  bentDampers = h("input", {
+    type: "checkbox", id: "two-slope", on: { change: () => {
+      if (bentDampers.checked) set({ fixed: get("fixed").filter((name) => !damperNames().includes(name)) });
       else holdDampers();
-      bend(box.checked);
     } },
   });
   return h("label", {
     className: "inline", title: "Another slope in rebound than in jounce, and a speed at which the " +
-      "force has fallen to half: four more parameters to find. Those of a car that has such dampers " +
-      "are known until they are freed.",
-  }, box, " Two-slope dampers");
+      "force has fallen to half: four more parameters to find. The car on show stays as it is until the " +
+      "fit is applied; where it has such dampers, they are known until they are freed.",
+  }, bentDampers, " Find two-slope dampers");
 }
 
 export function view() {
   askBounds();
   note = h("span", { className: "hint plain", id: "free-note" });
   body = h("tbody");
-  fill();
+  known = h("div");
   const section = h("section", {},
     h("h3", {}, "Free parameters ", note),
     dampers(),
@@ -78,20 +92,22 @@ export function view() {
     h("p", { className: "hint" }, h("span", { className: "mark-own" }, "typed"), " ",
       h("span", { className: "mark-outside" }, "from the applied fit")),
     sensors.view(),
-    priors.view(shown().map(({ name }) => name), (name) => !fixed.has(name)));
+    known);
   show();
   return section;
 }
 
 /** Names of the free parameters. */
 export const names = () =>
-  shown().map(({ name }) => name).filter((name) => !fixed.has(name));
+  shown().map(({ name }) => name).filter(isFree);
+
+const isFree = (name) => !get("fixed").includes(name);
 
 /** {name: [lower, upper]} of the free parameters whose bounds are not the default. */
 export async function bounds() {
   await askBounds();
   return Object.fromEntries(names()
-    .filter((name) => heldBounds(name) || typed[name]?.some((bound) => bound !== null))
+    .filter((name) => heldBounds(name) || get("bounds")[name]?.some((bound) => bound !== null))
     .map((name) => [name, boundsOf(name)]));
 }
 
@@ -101,7 +117,7 @@ export function askBounds() {
   asking ??= (async () => {
     while (get("defaultBounds")?.start !== get("values")) {
       const start = get("values");
-      set({ defaultBounds: { start, bounds: await api.defaultBounds(start) } });
+      set({ defaultBounds: { start, bounds: await api.defaultBounds(starts()) } });
     }
   })().catch((error) => {
     if (!error.lost) throw error;
@@ -115,19 +131,18 @@ function freeRow(parameter) {
   const free = h("input", {
     type: "checkbox", "aria-label": `${parameter.label} is free`,
     on: { change: () => {
-      if (free.checked) fixed.delete(name);
-      else fixed.add(name);
-      show();
+      const others = get("fixed").filter((one) => one !== name);
+      set({ fixed: free.checked ? others : [...others, name] });
     } },
   });
   const fields = ["Lower", "Upper"].map((word, side) => {
     const field = h("input", {
       type: "number", step: "any", "aria-label": units.withUnit(`${word} bound of ${parameter.label}`, unit, ", "),
       on: { change: () => {
-        typed[name] ??= [null, null];
-        typed[name][side] = field.value === "" ? null : Number(field.value) / factor;
+        const both = [...get("bounds")[name] ?? [null, null]];
+        both[side] = field.value === "" ? null : Number(field.value) / factor;
+        set({ bounds: { ...get("bounds"), [name]: both } });
         update({ typing: false });
-        show();
       } },
     });
     return field;
@@ -140,13 +155,13 @@ function freeRow(parameter) {
     begins, fields.map((field) => h("td", {}, field)),
     h("td", { className: "unit" }, unit));
   const update = ({ typing = true } = {}) => {
-    const start = get("values")[name];
+    const start = starts()[name];
     const both = boundsOf(name);
     const held = heldBounds(name);
     const usual = usualBounds(name);
-    free.checked = !fixed.has(name);
+    free.checked = isFree(name);
     fields.forEach((field, side) => {
-      const own = (typed[name]?.[side] ?? null) !== null;
+      const own = (get("bounds")[name]?.[side] ?? null) !== null;
       if (!typing || field !== document.activeElement) field.value = units.short(both[side] * factor);
       field.disabled = !free.checked;
       field.classList.toggle("own", own);
@@ -178,7 +193,7 @@ function doubtOf(start, [lower, upper]) {
 
 /** Between which values a parameter is searched, SI: as typed, else as usual. */
 function boundsOf(name) {
-  return usualBounds(name).map((value, side) => typed[name]?.[side] ?? value);
+  return usualBounds(name).map((value, side) => get("bounds")[name]?.[side] ?? value);
 }
 
 /** Bounds where none is typed; NaN until the service has told them, and where none follow. */

@@ -8,7 +8,6 @@ import * as free from "./free.js";
 import { jobs } from "./job.js";
 import { nameOf } from "./names.js";
 import { notice } from "./notices.js";
-import * as noise from "./noise.js";
 import { brakingOf, ready, rimsOf } from "./preparation.js";
 import * as priors from "./priors.js";
 import * as profile from "./profile.js";
@@ -79,16 +78,17 @@ async function request() {
     runs: runs.map(({ id }) => id),
     free: free.names(),
     bounds: await free.bounds(),
-    noise: noise.typed(),
+    noise: get("noise"),
     priors: priors.typed(free.names()),
-    ...search.typed(),
-    ...sensors.typed(),
+    ...get("search"),
+    sensors: get("sensors"),
+    fit_noise: get("fitNoise"),
     traction: get("traction"),
     settings: get("rimsSettings"),
     braking: brakingOf(runs.map(({ id }) => id)),
     key: crypto.randomUUID?.() ?? String(Math.random()).slice(2),
   };
-  holdouts = Object.fromEntries(setup.heldOut().map((run) => [run.id, null]));
+  holdouts = Object.fromEntries(setup.heldOut(runs).map((run) => [run.id, null]));
   return body;
 }
 
@@ -122,7 +122,7 @@ async function scoreHoldouts() {
   const used = new Set(fitted.runs.map(({ id }) => id));
   const seen = get("measurements").filter(({ id }) => used.has(id));
   const ids = Object.keys(holdouts).length ? Object.keys(holdouts)
-    : setup.unseen(seen).map(({ id }) => id);
+    : setup.heldOut(seen).map(({ id }) => id);
   for (const id of ids) {
     try {
       const run = await api.simulate({
@@ -154,7 +154,7 @@ function show() {
             "Cancel")
         : h("button", { type: "button", id: "start", className: "primary", on: { click: start } },
             "Identify")),
-    view === "setup" ? setup.view(saidOfRuns) : fit.view(current(), holdouts, { ...hooks, offer }),
+    view === "setup" ? setup.view(show) : fit.view(current(), holdouts, { ...hooks, offer }),
   ), "#start, #cancel");
   saidOfRuns();
   advance();

@@ -16,9 +16,10 @@ import * as car from "./car.js";
 import * as charts from "./charts.js";
 import * as comfort from "./comfort.js";
 import * as controls from "./controls.js";
-import { $, debounced, tabs } from "./dom.js";
+import { $, tabs } from "./dom.js";
 import * as identification from "./identification.js";
 import * as intake from "./intake.js";
+import * as keeping from "./keeping.js";
 import * as measurements from "./measurements.js";
 import { banner, build as buildNotices, notice, refused } from "./notices.js";
 import * as profile from "./profile.js";
@@ -31,19 +32,16 @@ import * as units from "./units.js";
 import * as validation from "./validation.js";
 
 const RETRY = 1500;
-const SAVE_AFTER = 400;
 /** Height in which the twelve rows of a fit are seen at once, px; the 3D view's share by default. */
 const FIT_HEIGHT = 432;
 const STAGE_SHARE = [38, 54];
 
 const sid = location.pathname.split("/")[2];
-let unsaved = false;
-let saving = false;
 
 async function start() {
   api.useSession(sid);
   set({ session: sid, online: true, ready: false, compare: "baseline", road: null, liftOff: false, fit: null, fitJob: null,
-    now: null, reference: null, measured: null, bands: null, traction: "exact", braking: {} });
+    now: null, reference: null, measured: null, bands: null });
   const [
     session, parameters, channels, vehicles, manoeuvres, plants, formats, roads, rimsSettings,
   ] = await Promise.all([
@@ -53,13 +51,14 @@ async function start() {
   units.learn(channels, parameters);
   const { vehicle, measurements: rows } = session;
   const baseline = session.baseline ?? vehicle;
-  set({ parameters, channels, vehicles, manoeuvres, plants, formats, roads, rimsSettings, vehicle, baseline,
-    measurements: rows });
+  set({ parameters, channels, vehicles, manoeuvres, plants, formats, roads, vehicle, baseline, measurements: rows,
+    rimsUsual: rimsSettings });
   const usable = rows.find((row) => row.usable_for_identification);
   set({
+    ...keeping.taken(session.setup, rimsSettings),
     values: controls.valuesOf(vehicle),
-    ride: usable ? { kind: "measurement", id: usable.id }
-      : { kind: "manoeuvre", key: manoeuvres[0].key },
+    ride: keeping.rideOf(session.setup, rows, manoeuvres) ?? (usable ? { kind: "measurement", id: usable.id }
+      : { kind: "manoeuvre", key: manoeuvres[0].key }),
   });
   build();
   follow();
@@ -102,11 +101,8 @@ function build() {
 
 /** What follows from a change. */
 function follow() {
-  on("values", () => {
-    unsaved = true;
-    saveSoon();
-    want("now", ...(get("compare") === "7dof" ? ["reference"] : []));
-  });
+  keeping.follow();
+  on("values", () => want("now", ...(get("compare") === "7dof" ? ["reference"] : [])));
   on("baseline", () => want("reference"));
   on("compare", () => {
     set({ reference: null });
@@ -150,25 +146,10 @@ function settle() {
     if (!settling) return;
     settling = null;
     set({ online: true, ready: true });
-    if (unsaved) saveSoon();
+    keeping.save();
     want("measured", "now", "reference", ...(get("now") ? ["scene"] : []));
   });
 }
-
-async function save() {
-  if (!unsaved) return;
-  unsaved = false;
-  saving = true;
-  try {
-    await api.saveVehicle(controls.withValues(get("vehicle"), get("values")));
-  } catch (error) {
-    unsaved = true;
-    if (error.lost) set({ online: false });
-  }
-  saving = false;
-}
-const saveSoon = debounced(save, SAVE_AFTER);
-window.addEventListener("pagehide", save);
 
 /** Something is gone: a file deleted in another tab, or the whole session. */
 async function lookAgain() {
@@ -195,7 +176,7 @@ function applyFit(result) {
   set({ values: { ...get("values"),
     ...Object.fromEntries(result.parameters.map(({ name, value }) => [name, value])) } });
   bands.applied();
-  save();
+  keeping.save();
   notice("info", "The sliders hold the identified car",
     "“Set baseline” makes it the car that later changes are compared with.");
 }
@@ -265,7 +246,7 @@ function lost(error) {
 window.ridetune = {
   state: get, timing, scene: scene.seen, drawn: charts.drawn, zoomed: charts.zoomed,
   clock: timeline.clock, job: identification.current,
-  validation: validation.current, campaign: campaign.current, profile: profile.current, advice: advice.given, idle, unsaved: () => unsaved || saving,
+  validation: validation.current, campaign: campaign.current, profile: profile.current, advice: advice.given, idle, unsaved: keeping.unsaved,
 };
 
 start().catch(lost);

@@ -60,11 +60,13 @@ function build() {
   parts.count = h("span", { className: "hint" });
   parts.numbers = [number("Bridge gaps up to", "longest_gap", 1, "s"), number("Sample every", "step", 1e3, "ms", "finest")];
   parts.forget = h("button", { type: "button", on: { click: forget } }, "Forget mapping");
+  parts.download = h("a", { className: "button", download: "", href: api.mappingUrl(at.row.id),
+    title: "The mapping that is applied, for other recordings and for --mapping on the command line" }, "Download mapping");
   parts.apply = h("button", { type: "button", id: "apply-mapping",
     on: { click: async () => { if (await apply()) show(); } } }, "Apply");
   parts.next = h("span");
   // What comes and goes stands left of Apply, which so stays under the hand.
-  host.tools(...parts.numbers.map(({ element }) => element), parts.forget, parts.next, parts.apply);
+  host.tools(...parts.numbers.map(({ element }) => element), parts.download, parts.forget, parts.next, parts.apply);
   parts.view = h("div", { className: "mapping" },
     parts.head,
     h("div", { className: "mapping-bar" }, filter, h("label", { className: "inline" }, only, "only mapped"),
@@ -375,6 +377,7 @@ function told() {
       ? "○ is for conditioning to make of the raw sensors, which comes next."
       : "Map columns that hold them, or raw sensors of which conditioning makes them.")] : []));
   parts.forget.hidden = !at.row.mapping;
+  parts.download.hidden = !at.row.mapping || !at.applied;
   parts.apply.classList.toggle("primary", !at.applied);
   parts.count.textContent = `${at.entries.size} of ${at.columns.length} mapped`;
   parts.next.replaceChildren(...[at.applied ? host.next(at.row) : null].filter(Boolean));

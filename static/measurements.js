@@ -123,6 +123,12 @@ async function take(file) {
   }
   set({ measurements: [...get("measurements"), row] });
   selected = row.id;
+  const first = original(row);
+  if (first) {
+    notice("warning", `${nameOf(row.id)} holds the same data as ${nameOf(first.id)}`,
+      "It is kept, and left out of fits until its use is chosen; fitted beside the other it would count twice.");
+    return;
+  }
   const { length } = row.warnings;
   if (nextStage(row) !== "ready") {
     const stage = nextStage(row);
@@ -283,10 +289,10 @@ function detail(row) {
         : h("button", { type: "button", on: { click: () => work("channels") } }, "Mapping"),
       row.needs_mapping || stage === "conditioning" ? null
         : h("button", { type: "button", on: { click: () => work("conditioning") } }, "Conditioning"),
-      h("a", { className: "button", href: api.originalUrl(row.id), download: row.name }, "Download"),
       h("button", { type: "button", className: "danger", on: { click: (event) => remove(row, event) } },
         "Delete")),
     stepper(row, work),
+    downloads(row),
     stage === "ready" ? null
       : h("p", { className: "hint" }, stagesOf(row).find(({ key }) => key === stage).told),
     ...(names.length ? [h("div", { className: "row-tools" }, choice, facts), drawing] : []),
@@ -298,6 +304,19 @@ function detail(row) {
       ? [h("ul", { className: "warnings", tabIndex: -1 }, doubtsOf(row).map((text) => h("li", {}, text)))] : []),
   ].filter(Boolean));
   if (names.length) look(row, choice.value, drawing, facts);
+}
+
+/** The file as it came, and what was made of it, for the command line and other programs. */
+function downloads(row) {
+  const link = (text, href, title) => [" ", h("a", { href, download: "", title, "aria-label": `Download ${text}` }, text)];
+  return h("p", { className: "hint", id: "downloads" }, "Download",
+    link("original", api.originalUrl(row.id), "The file as it was added, byte for byte"),
+    row.needs_mapping ? null : [
+      link("CSV", api.runUrl(row.id), "The recording as it is used, conditioned if it is, in SI"),
+      link("notes", api.notesUrl(row.id), "Its noise and what was done to it, to lie beside the CSV"),
+    ].flat(),
+    row.mapping ? link("mapping", api.mappingUrl(row.id),
+      "Which columns are which channels, for --mapping on the command line") : null);
 }
 
 /** The last preview asked for; a file is not deleted under its reader. */

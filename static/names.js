@@ -8,11 +8,14 @@ export const distinct = (names) => names.map((name, k) => {
   return alike ? `${name} (${alike + 1})` : name;
 });
 
-/** The recording before this one that holds the same bytes, or nothing. */
+/** What stands for the data of a recording: the first one with the same. */
+export const dataOf = ({ id, same_data_as: first }) => first ?? id;
+
+/** The recording before this one that holds the same data, or nothing. */
 export function original(run) {
   const rows = get("measurements");
   return rows.slice(0, rows.findIndex(({ id }) => id === run.id))
-    .find(({ sha256 }) => sha256 === run.sha256);
+    .find((one) => dataOf(one) === dataOf(run));
 }
 
 /** What the page calls a recording, or null for one that is gone. */

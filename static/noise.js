@@ -4,19 +4,15 @@
 import { fold, h } from "./dom.js";
 import { nameOf } from "./names.js";
 import { notice } from "./notices.js";
+import { get, set } from "./store.js";
 import * as units from "./units.js";
 
 const SHORT = { "chassis.z": "z", "chassis.pitch": "pitch", "chassis.roll": "roll" };
 const CHANNELS = Object.keys(SHORT);
-/** Typed noise by channel, SI. */
-const own = {};
 const memory = { open: false };
 /** What brings the fields up to date with the runs that are fitted. */
 let rows = [];
 let summary = null;
-
-/** {channel: SI} of the noise that was typed. */
-export const typed = () => ({ ...own });
 
 export function view(runs) {
   summary = h("summary");
@@ -43,8 +39,9 @@ function row(name) {
     type: "number", min: "0", step: "any",
     "aria-label": `Noise of ${SHORT[name]}, ${unit}; empty for as stated`,
     on: { change: () => {
-      if (field.value === "" && !field.validity.badInput) delete own[name];
-      else if (Number(field.value) > 0) own[name] = Number(field.value) / factor;
+      const { [name]: _, ...others } = get("noise");
+      if (field.value === "" && !field.validity.badInput) set({ noise: others });
+      else if (Number(field.value) > 0) set({ noise: { ...others, [name]: Number(field.value) / factor } });
       else refuse(name, fitted);
       show(fitted);
     } },
@@ -52,7 +49,7 @@ function row(name) {
   rows.push((runs) => {
     fitted = runs;
     const [word, text] = holding(name, runs);
-    field.value = name in own ? units.plain(own[name] * factor, 4) : "";
+    field.value = name in get("noise") ? units.plain(get("noise")[name] * factor, 4) : "";
     field.placeholder = text;
     field.title = runs.map((run) => `${nameOf(run.id)}: ${said(name, run.noise[name])}`).join("\n");
     source.textContent = word;
@@ -66,13 +63,13 @@ function row(name) {
 function holding(name, runs) {
   const stated = [...new Set(runs.map(({ noise }) => noise[name] ?? units.channel(name).default_noise))];
   const text = stated.length > 1 ? "by run" : inUnit(name, stated[0] ?? units.channel(name).default_noise);
-  if (name in own) return ["typed", text];
+  if (name in get("noise")) return ["typed", text];
   return [runs.some(({ noise }) => name in noise) ? "stated" : "default", text];
 }
 
 function refuse(name, runs) {
   const { label, display_unit: unit } = units.channel(name);
-  const now = name in own ? inUnit(name, own[name]) : holding(name, runs)[1];
+  const now = name in get("noise") ? inUnit(name, get("noise")[name]) : holding(name, runs)[1];
   notice("warning", `The noise of ${label.toLowerCase()} stays ${now} ${unit}`,
     "Noise is a positive number; an empty field takes what the run states, else the default.");
 }

@@ -3,6 +3,7 @@
 import { fold, h } from "./dom.js";
 import { nameOf } from "./names.js";
 import { get, set } from "./store.js";
+import * as units from "./units.js";
 
 const FILTERS = [
   ["a_x_cutoff_hz", "aₓ below", "Low-pass of the longitudinal acceleration"],
@@ -27,12 +28,32 @@ export function rimsOf(id) {
 export const brakingOf = (ids) =>
   Object.fromEntries(Object.entries(get("braking")).filter(([id]) => ids.includes(id)));
 
+/** What differs from the usual, in words. */
+function different() {
+  const [now, usual] = [get("rimsSettings"), get("rimsUsual")];
+  return [
+    ...FILTERS.filter(([key]) => now[key] !== usual[key]).map(([key, name]) => (now[key] === null
+      ? name.replace(/ \w+$/, " unfiltered") : `${name} ${units.plain(now[key])} Hz`)),
+    get("traction") === "paper" && "paper's traction",
+    now.initial_state === "measured" && "initial state as measured",
+  ].filter(Boolean);
+}
+
 /** The choices that hold for every recording. */
 export function view() {
   const settings = get("rimsSettings");
-  const change = (changes) => set({ rimsSettings: { ...get("rimsSettings"), ...changes } });
-  return fold(memory, h("summary", {}, "How recordings drive the model"),
-    choice("Traction", "traction", TRACTIONS, get("traction"), (traction) => set({ traction }),
+  const summary = h("summary");
+  const follow = () => {
+    summary.textContent = `How recordings drive the model: ${different().join("; ") || "as usual"}`;
+  };
+  const keep = (changes) => {
+    set(changes);
+    follow();
+  };
+  const change = (changes) => keep({ rimsSettings: { ...get("rimsSettings"), ...changes } });
+  follow();
+  return fold(memory, summary,
+    choice("Traction", "traction", TRACTIONS, get("traction"), (traction) => keep({ traction }),
       "exact: the force that gives the measured aₓ; paper: total mass times aₓ"),
     choice("Initial state", "initial-state", STATES, settings.initial_state,
       (initial_state) => change({ initial_state }),

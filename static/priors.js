@@ -1,24 +1,23 @@
 // What is known of parameters before the runs: a mean and a standard deviation each.
 
 import { fold, h, symbol } from "./dom.js";
-import { get } from "./store.js";
+import { get, set } from "./store.js";
 import * as units from "./units.js";
 
 const memory = { open: false };
-/** Typed texts by parameter, [mean, deviation], in display units. */
-const own = {};
 
-/** {parameter: [mean, deviation]}, SI, of the free parameters given. */
-export const typed = (free) => Object.fromEntries(free.filter(whole)
-  .map((name) => [name, own[name].map((text) => Number(text) / units.parameter(name).display_factor)]));
+/** {parameter: [mean, deviation]}, SI, of those that were typed as a whole. */
+export const whole = () => Object.fromEntries(Object.entries(get("priors"))
+  .filter(([, [mean, deviation]]) => mean !== null && deviation > 0));
 
-const whole = (name) => Boolean(own[name]?.every((text) => text !== "" && Number.isFinite(Number(text))));
+/** The same of the free parameters given. */
+export const typed = (free) => Object.fromEntries(Object.entries(whole()).filter(([name]) => free.includes(name)));
 
 /** The folded table of the parameters given; `isFree(name)` tells whose prior counts. */
 export function view(names, isFree) {
   const summary = h("summary");
   const follow = () => {
-    const known = names.filter((name) => whole(name) && isFree(name));
+    const known = names.filter((name) => name in whole() && isFree(name));
     summary.replaceChildren("Known before: ", ...(known.length
       ? known.flatMap((name, i) => [i ? ", " : "", symbol(units.parameter(name).symbol)]) : ["nothing"]));
   };
@@ -35,13 +34,15 @@ export function view(names, isFree) {
 
 function row(name, follow) {
   const { label, symbol: text, display_unit: unit, display_factor: factor } = units.parameter(name);
+  const shown = (value) => (value === null || value === undefined ? "" : units.plain(value * factor, 12));
   const fields = ["Mean", "Standard deviation"].map((word, k) => h("input", {
-    type: "number", step: "any", min: k ? "0" : undefined, value: own[name]?.[k] ?? "",
-    placeholder: k ? "" : units.plain(get("values")[name] * factor, 3),
+    type: "number", step: "any", min: k ? "0" : undefined, value: shown(get("priors")[name]?.[k]),
+    placeholder: k ? "" : name in get("values") ? units.plain(get("values")[name] * factor, 3) : "",
     "aria-label": units.withUnit(`${word} of ${label} known before`, unit, ", "),
     on: { change: () => {
-      own[name] = fields.map((one) => one.value);
-      if (own[name].every((one) => one === "")) delete own[name];
+      const { [name]: [...both] = [null, null], ...others } = get("priors");
+      both[k] = fields[k].value === "" ? null : Number(fields[k].value) / factor;
+      set({ priors: both.every((one) => one === null) ? others : { ...others, [name]: both } });
       check();
       fields.find((one) => !one.validity.valid && one.value !== "")?.reportValidity();
       follow();

@@ -57,6 +57,10 @@ function judged({ p, effective_samples: worth, samples }) {
 
 /** The minima that many starts ended in, the best first. */
 export function minima({ result }) {
+  if (!(result.starts > 1)) {
+    return h("p", { className: "empty" }, "This fit searched from one start, so other minima are not known. Give more " +
+      "“Starts” under Set-up, Search, and identify again to see them.");
+  }
   const [best] = result.minima;
   const run = Object.keys(best.fit_percent)[0];
   const channels = Object.keys(best.fit_percent[run] ?? {});

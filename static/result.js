@@ -3,7 +3,7 @@
 import { percent, short } from "./comfort.js";
 import { DETERMINED, isOfThisCar } from "./controls.js";
 import { costChart } from "./cost.js";
-import { $, breakable, fileName, h, saveFile, symbol } from "./dom.js";
+import { $, breakable, capital, fileName, h, saveFile, symbol } from "./dom.js";
 import { span } from "./intervals.js";
 import { distinct, nameOf } from "./names.js";
 import * as sensors from "./sensors_form.js";
@@ -60,6 +60,7 @@ function running(job) {
   return h("div", { className: "fit" },
     h("div", { className: "fit-main scrolls" },
       h("p", { className: `outcome ${job.state}`, id: "outcome" }, outcome(job)),
+      h("p", { id: "stage-of-fit" }),
       job.error ? h("div", { className: "problem", role: "alert" },
         h("strong", {}, "The identification failed"), h("p", {}, worded(job.error.detail))) : null,
       h("h3", {}, "Cost"), cost.element, h("p", { className: "hint", id: "cost-now" })),
@@ -110,9 +111,23 @@ export function advance(job) {
       h("td", { className: "unit" }, row.display_unit));
   }));
   const before = ["queued", "running"].includes(job.state) ? "Not started yet." : "";
+  const stage = $("#stage-of-fit");
+  if (stage) stage.textContent = stageOf(job);
   $("#cost-now").textContent = last === undefined || last === null ? before
     : `${units.number(last, 4)} after ${history.length} steps, ${simulations} simulations` +
       (job.result ? `, ${units.number(job.result.seconds, 2)} s` : "");
+}
+
+/** Which of its searches a fit from many starts is at, and how long they still take where that is known. */
+function stageOf({ state, starts, progress }) {
+  if (state !== "running" || !progress?.stage) return "";
+  const { stage, search, searches, seconds_left: left } = progress;
+  if (stage === "screening") return `Screening ${starts} starts: each is simulated once.`;
+  const place = searches > 1 ? `search ${search} of ${searches}` : "";
+  if (stage === "reweighing") return `Fitting again with the noise found${place ? `: ${place}` : ""}.`;
+  if (!place) return "";
+  return `${capital(place)}, from the start values and the best of ${starts} starts` +
+    `${left === null ? "" : `; about ${Math.ceil(left)} s left`}.`;
 }
 
 /** What is wrong or doubtful, with a button where the fit offers the remedy. */

@@ -1,35 +1,34 @@
 // How a fit searches: from how many starts, and how much outliers count.
 
 import { fold, h } from "./dom.js";
+import { get, set } from "./store.js";
 import * as units from "./units.js";
 
 const LOSSES = {
   linear: "least squares", soft_l1: "soft L1", huber: "Huber", cauchy: "Cauchy", arctan: "arctan",
 };
-const USUAL = { starts: 1, seed: 0, loss: "linear", loss_scale: 3 };
+export const USUAL = { starts: 1, seed: 0, loss: "linear", loss_scale: 3 };
 const MOST_STARTS = 1024;
 const memory = { open: false };
-const asked = { ...USUAL };
 
-/** The fields of a request. */
-export const typed = () => ({ ...asked });
+const ask = (change) => set({ search: { ...get("search"), ...change } });
 
 export function view() {
   const summary = h("summary");
   const scale = number("loss_scale", "From so many noises on", { min: "0.01", step: "any" },
     "Residuals beyond this many noises count as outliers");
   const follow = () => {
-    scale.field.disabled = asked.loss === "linear";
+    scale.field.disabled = get("search").loss === "linear";
     summary.textContent = `Search: ${said()}`;
   };
   const loss = h("select", { id: "loss", title: "How residuals far beyond the noise count: squared, or less",
-    on: { change: () => { asked.loss = loss.value; follow(); } } },
-  Object.entries(LOSSES).map(([key, text]) => h("option", { value: key, selected: key === asked.loss }, text)));
+    on: { change: () => { ask({ loss: loss.value }); follow(); } } },
+  Object.entries(LOSSES).map(([key, text]) => h("option", { value: key, selected: key === get("search").loss }, text)));
   function number(key, label, properties, title) {
-    const field = h("input", { type: "number", id: `search-${key}`, title, value: asked[key], ...properties,
+    const field = h("input", { type: "number", id: `search-${key}`, title, value: get("search")[key], ...properties,
       on: { change: () => {
         if (field.value === "") field.value = USUAL[key];
-        if (field.reportValidity()) asked[key] = Number(field.value);
+        if (field.reportValidity()) ask({ [key]: Number(field.value) });
         follow();
       } } });
     return { field, label: h("label", { className: "block" }, label, field) };
@@ -46,8 +45,10 @@ export function view() {
 
 /** What differs from what is usual. */
 function said() {
+  const asked = get("search");
   const parts = [
     asked.starts !== USUAL.starts && `${asked.starts} starts`,
+    asked.seed !== USUAL.seed && `seed ${asked.seed}`,
     asked.loss !== USUAL.loss && `${LOSSES[asked.loss]} from ${units.plain(asked.loss_scale)} noises`,
   ].filter(Boolean);
   return parts.length ? parts.join(", ") : "one start, least squares";

@@ -3,26 +3,19 @@
 
 import { fold, h } from "./dom.js";
 import { CORNERS } from "./poses.js";
+import { get, set } from "./store.js";
 import * as units from "./units.js";
 
 const SHORT = { "chassis.z": "z", "chassis.pitch": "pitch", "chassis.roll": "roll", "chassis.a_x": "aₓ",
   ...Object.fromEntries(CORNERS.map((corner) => [`wheel.${corner}.z`, `wheel ${corner.toUpperCase()}`])) };
 const FIT = "fit";
 const memory = { open: false };
-/** {channel: {quantity: SI or "fit"}} of what was typed. */
-const own = {};
-let fitNoise = false;
 let follow = () => {};
-
-/** Fields of a request; none while the sensors are taken for ideal. */
-export const typed = () => ({
-  ...(Object.keys(own).length ? { sensors: structuredClone(own) } : {}),
-  ...(fitNoise ? { fit_noise: true } : {}),
-});
 
 /** Take what a fit offers for a channel. */
 export function take({ channel, sensor }) {
-  own[channel] = { ...own[channel], ...sensor };
+  const known = get("sensors");
+  set({ sensors: { ...known, [channel]: { ...known[channel], ...sensor } } });
   memory.open = true;
 }
 
@@ -36,11 +29,11 @@ function shownIn(name, quantity) {
 
 export function view() {
   const summary = h("summary");
-  const noise = h("input", { type: "checkbox", checked: fitNoise,
-    on: { change: () => { fitNoise = noise.checked; follow(); } } });
+  const noise = h("input", { type: "checkbox", checked: get("fitNoise"),
+    on: { change: () => { set({ fitNoise: noise.checked }); follow(); } } });
   follow = () => {
-    const names = Object.keys(own).map((name) => SHORT[name] ?? name);
-    const told = [...names, ...(fitNoise ? ["noise fitted"] : [])];
+    const names = Object.keys(get("sensors")).map((name) => SHORT[name] ?? name);
+    const told = [...names, ...(get("fitNoise") ? ["noise fitted"] : [])];
     summary.textContent = `Sensors: ${told.length ? told.join(", ") : "as recorded"}`;
   };
   const part = fold(memory, summary,
@@ -58,7 +51,7 @@ export function view() {
 function row(name) {
   const { label, display_unit: unit } = units.channel(name);
   const sign = h("select", { "aria-label": `Sign of ${label}`, on: { change: () => put(name, "sign", sign.value === "-1" ? -1 : null) } },
-    [["1", "+"], ["-1", "−"]].map(([value, text]) => h("option", { value, selected: String(own[name]?.sign ?? 1) === value }, text)));
+    [["1", "+"], ["-1", "−"]].map(([value, text]) => h("option", { value, selected: String(get("sensors")[name]?.sign ?? 1) === value }, text)));
   return h("tr", {}, h("th", { scope: "row", title: label }, SHORT[name]),
     h("td", {}, sign), ["gain", "delay", "bias"].map((quantity) => h("td", {}, field(name, quantity, label))),
     h("td", { className: "unit" }, unit));
@@ -66,7 +59,7 @@ function row(name) {
 
 function field(name, quantity, label) {
   const { factor, unit } = shownIn(name, quantity);
-  const kept = own[name]?.[quantity];
+  const kept = get("sensors")[name]?.[quantity];
   const usual = quantity === "gain" ? "1" : "0";
   const element = h("input", { type: "text", inputMode: "decimal", placeholder: usual,
     value: kept === undefined ? "" : kept === FIT ? FIT : units.plain(kept * factor),
@@ -82,10 +75,10 @@ function field(name, quantity, label) {
 }
 
 function put(name, quantity, value) {
-  const { [quantity]: _, ...others } = own[name] ?? {};
+  const { [name]: known = {}, ...channels } = get("sensors");
+  const { [quantity]: _, ...others } = known;
   const told = value === null ? others : { ...others, [quantity]: value };
-  if (Object.keys(told).length) own[name] = told;
-  else delete own[name];
+  set({ sensors: Object.keys(told).length ? { ...channels, [name]: told } : channels });
   follow();
 }
 

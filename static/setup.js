@@ -2,36 +2,34 @@
 
 import { breakable, h } from "./dom.js";
 import * as free from "./free.js";
-import { lacks, nameOf, original } from "./names.js";
+import { dataOf, lacks, nameOf, original } from "./names.js";
 import * as noise from "./noise.js";
 import * as preparation from "./preparation.js";
 import * as search from "./search_form.js";
-import { get } from "./store.js";
+import { get, set } from "./store.js";
 
-const ROLES = { fit: "fit", holdout: "hold out", no: "leave out" };
-/** The role of each run whose use was chosen. */
-const roles = {};
+const USES = { fit: "fit", hold_out: "hold out", leave_out: "leave out" };
 
 /** How a run is used: unless chosen, the ride on show (or the first) is fitted, others held out. */
-function roleOf(run) {
-  if (!run.usable_for_identification) return "no";
-  if (roles[run.id]) return roles[run.id];
+function useOf(run) {
+  if (!run.usable_for_identification) return "leave_out";
+  if (get("use")[run.id]) return get("use")[run.id];
   const usable = get("measurements").filter((m) => m.usable_for_identification);
   const { kind, id } = get("ride");
   const shown = usable.find((m) => kind === "measurement" && m.id === id) ?? usable[0];
   if (run === shown) return "fit";
-  return run.sha256 === shown.sha256 || original(run) ? "no" : "holdout";
+  return dataOf(run) === dataOf(shown) || original(run) ? "leave_out" : "hold_out";
 }
 
-export const fitted = () => get("measurements").filter((run) => roleOf(run) === "fit");
+export const fitted = () => get("measurements").filter((run) => useOf(run) === "fit");
 
-/** Runs to score that are not fitted: what was fitted under another name is not unseen. */
-export const heldOut = () => unseen(fitted()).filter((run) => roleOf(run) === "holdout");
+/** Runs to score beside those fitted: what was fitted under another name is not unseen. */
+export const heldOut = (seen) => unseen(seen).filter((run) => useOf(run) !== "leave_out");
 
 /** Usable runs with other data than these. */
 export function unseen(seen) {
-  const data = new Set(seen.map(({ sha256 }) => sha256));
-  return get("measurements").filter((run) => run.usable_for_identification && !data.has(run.sha256));
+  const data = new Set(seen.map(dataOf));
+  return get("measurements").filter((run) => run.usable_for_identification && !data.has(dataOf(run)));
 }
 
 /** The set-up; `used()` is called when the use of a run has changed. */
@@ -53,13 +51,15 @@ export function view(used) {
 }
 
 function runRow(run, used) {
-  const role = roleOf(run);
+  const choose = (value) => {
+    set({ use: { ...get("use"), [run.id]: value } });
+    used();
+  };
   return h("li", {},
     h("span", { className: "run-name", title: nameOf(run.id) }, breakable(nameOf(run.id))),
     run.usable_for_identification
       ? h("span", { className: "run-use" },
-          select(ROLES, role, (value) => { roles[run.id] = value; noise.show(fitted()); used(); },
-            { "aria-label": `Use of ${nameOf(run.id)}` }),
+          select(USES, useOf(run), choose, { "aria-label": `Use of ${nameOf(run.id)}` }),
           h("label", {}, "brakes", preparation.brakingField(run)),
           copied(run))
       : h("span", { className: "badge", title: `${lacks(run)}.` }, "not for fitting"));
@@ -67,7 +67,10 @@ function runRow(run, used) {
 
 function copied(run) {
   const first = original(run);
-  return first ? h("span", { className: "hint" }, "the same data as ", breakable(nameOf(first.id))) : null;
+  if (!first) return null;
+  const twice = useOf(first) === "fit" && useOf(run) === "fit";
+  return h("span", { className: twice ? "worse" : "hint" }, "the same data as ", breakable(nameOf(first.id)),
+    twice ? ", which so counts twice" : "");
 }
 
 function select(options, value, change, properties) {

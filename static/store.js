@@ -10,8 +10,17 @@
 //                (a manoeuvre that the service does not know by its key is `given` as an object)
 //   ride         {kind: "measurement", id} or {kind: "manoeuvre", key}
 //   road         null (as the manoeuvre says) or a road description
+//   use          {measurement id: "fit", "hold_out" or "leave_out"} where that was chosen
+//   fixed        names of the parameters that a fit leaves alone
+//   bounds       {parameter: [SI or null, SI or null]}, typed
+//   search       {starts, seed, loss, loss_scale} of a fit
+//   noise        {channel: SI}, typed
+//   priors       {parameter: [mean or null, deviation or null]}, SI, typed
+//   sensors      {channel: {quantity: SI or "fit"}}, typed
+//   fitNoise     the noise of the compared channels is to be found
 //   traction     how a measured ride gets its traction, "exact" or "paper"
 //   rimsSettings   filters and initial state with which recordings drive the model
+//   rimsUsual    those that hold where none are chosen
 //   defaultBounds   {start, bounds}: default bounds of a fit by parameter, and their start values
 //   braking      {measurement id: [[begin, end], ...]} in s, marked by hand
 //   liftOff      wheels may leave the road

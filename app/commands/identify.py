@@ -7,14 +7,16 @@ from argparse import Namespace
 from collections.abc import Sequence
 
 from ...engine.channels import Run
-from ...engine.identification.fit import Fit, Progress
+from ...engine.identification.fit import Fit, Progress, Stage
 from ...engine.identification.fit_file import fit_to_json, profile_to_json
 from ...engine.identification.identify import identify as fit_to_runs
 from ...engine.identification.problem import Problem
 from ...engine.identification.profile import Profile, profile, require_free
 from ...engine.parameters import DAMPER_NAMES, PARAMETER_NAMES, parameter
 from ...engine.vehicle import Vehicle
-from .arguments import bounds, loss, priors, rims_settings, sensors, starts, whole
+from ..time_left import SearchClock
+from .arguments import bounds, loss, priors, rims_settings, sensors, whole
+from .arguments import starts as start_values
 from .inputs import find_mapping, find_vehicle, read_noise, read_runs, recording_files
 from .output import (
     print_fit_percent,
@@ -24,6 +26,7 @@ from .output import (
     significant,
     write_file,
 )
+from .watch import hours
 
 
 def identify(options: Namespace) -> None:
@@ -56,7 +59,7 @@ def asked(options: Namespace, vehicle: Vehicle, runs: Sequence[Run]) -> Problem:
         _free(options),
         options.fixed or None,
         bounds=bounds(options.bounds),
-        start=starts(options.start),
+        start=start_values(options.start),
         traction=options.traction or "exact",
         settings=rims_settings(options),
         loss=loss(options),
@@ -69,10 +72,14 @@ def asked(options: Namespace, vehicle: Vehicle, runs: Sequence[Run]) -> Problem:
 def fitted(options: Namespace, problem: Problem) -> Fit:
     """The fit, with its progress on a terminal."""
     watched = sys.stderr.isatty()
+    starts = whole(options.starts or "1", f"--starts {options.starts}", "how many starts")
+    clock = SearchClock(noise_follows=problem.sensors.finds_noise)
     fit = fit_to_runs(
         problem,
-        progress=_show if watched else None,
-        starts=whole(options.starts or "1", f"--starts {options.starts}", "how many starts"),
+        progress=(lambda now: _show(progress_line(now, starts, clock.left(now))))
+        if watched
+        else None,
+        starts=starts,
         seed=options.seed or 0,
     )
     if watched:
@@ -89,11 +96,20 @@ def _free(options: Namespace) -> list[str] | None:
     return [name for name in usual if name in (options.free or ()) or name not in fixed]
 
 
-def _show(progress: Progress) -> None:
+def progress_line(now: Progress, starts: int, seconds_left: float | None) -> str:
+    """How far a fit is, in one line."""
+    line = f"{now.simulations} simulations, cost {now.cost:.6g}"
+    if now.stage == Stage.SCREENING:
+        return f"{line}, screening {starts} starts"
+    if now.stage == Stage.REWEIGHING:
+        line += ", with the noise found"
+    if now.searches > 1:
+        line += f", search {now.search} of {now.searches}"
+    return line if seconds_left is None else f"{line}, about {hours(seconds_left)} left"
+
+
+def _show(line: str) -> None:
     """Keep one line on the terminal up to date."""
-    line = f"{progress.simulations} simulations, cost {progress.cost:.6g}"
-    if progress.searches > 1:
-        line += f", search {progress.search} of {progress.searches}"
     print(f"\r{line}\033[K", end="", file=sys.stderr, flush=True)
 
 

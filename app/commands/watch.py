@@ -46,5 +46,10 @@ class Watch(Generic[Progress]):
 
 def left(done: float, of: float, seconds: float) -> str:
     """How long the rest takes at the speed so far."""
-    rest = round((of - done) * seconds / done) if done else 0
-    return f"{rest // 3600}:{rest // 60 % 60:02}:{rest % 60:02} left"
+    return f"{hours((of - done) * seconds / done if done else 0.0)} left"
+
+
+def hours(seconds: float) -> str:
+    """A time as 1:02:03."""
+    whole = round(seconds)
+    return f"{whole // 3600}:{whole // 60 % 60:02}:{whole % 60:02}"

@@ -263,12 +263,23 @@ class Minimum:
     outcome: Ending
 
 
+class Stage(StrEnum):
+    """What a fit is at."""
+
+    SCREENING = "screening"
+    """Every start is simulated once."""
+    SEARCHING = "searching"
+    """From the told start and the best of the others."""
+    REWEIGHING = "reweighing"
+    """The minima are refined with the noise that was found from their residuals."""
+
+
 @dataclass(frozen=True, slots=True)
 class Progress:
     """Where a fit stands after an evaluation: the best found so far.
 
     cost : half the sum of squared residuals, in units of the noise
-    search, searches : which of how many searches is under way, from 1
+    search, searches : which of how many searches of the stage is under way, from 1; 0 before them
     """
 
     evaluations: int
@@ -276,6 +287,7 @@ class Progress:
     cost: float
     parameters: Mapping[str, float]
     fit_percent: Mapping[str, Mapping[str, float]]
+    stage: Stage = Stage.SEARCHING
     search: int = 1
     searches: int = 1
 

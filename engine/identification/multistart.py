@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats.qmc import Sobol
 
-from .fit import Ending
+from .fit import Ending, Stage
 from .search import Found, Search
 
 Array = NDArray[np.float64]
@@ -50,12 +50,12 @@ def refined_starts(
 
     start : refined first and in any case;  others : points, of which the best are refined
     """
-    costs = search.residuals.costs(others) if others else np.zeros(0)
+    costs = search.screened(start, others, min(1 + len(others), REFINED))
     best = [k for k in np.argsort(costs, kind="stable")[: REFINED - 1] if np.isfinite(costs[k])]
     trials = [start, *(others[k] for k in best)]
     minima: list[list[Found]] = []
     for k, trial in enumerate(trials):
-        search.turn = (k + 1, len(trials))
+        search.stage, search.turn = Stage.SEARCHING, (k + 1, len(trials))
         known = [of[0] for of in minima if of[0].ending == Ending.CONVERGED]
         found = (
             search.explore(trial, most_evaluations, known)

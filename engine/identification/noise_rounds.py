@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..run_notes import DEFAULT_NOISE
 from .compared_runs import SENSORS_BEST
+from .fit import Stage
 from .residuals import FAILED_TRIAL, Residuals
 from .search import Found, Search
 
@@ -41,11 +42,12 @@ def with_found_noise(
         ):
             break
         search.weigh(search.residuals.of(search.residuals.problem.with_noise(noise)))
-        reached = [
-            [replace(search.refine(of[0].x, most_evaluations), told=of[0].told), *of[1:]]
-            for of in reached
-        ]
-        reached = _regrouped(reached)
+        refined = []
+        for k, of in enumerate(reached, start=1):
+            search.stage, search.turn = Stage.REWEIGHING, (k, len(reached))
+            found = search.refine(of[0].x, most_evaluations)
+            refined.append([replace(found, told=of[0].told), *of[1:]])
+        reached = _regrouped(refined)
     return reached
 
 

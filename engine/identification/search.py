@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from .condensed import condensed_jacobian, condensed_residuals
-from .fit import Ending, Progress
+from .fit import Ending, Progress, Stage
 from .residuals import FAILED_TRIAL, Residuals
 from .uncertainty import DIRECTION_TOLERANCE
 
@@ -130,6 +130,7 @@ class Search:
         self.residuals = residuals
         self.evaluations = 0
         self.cost_history: list[float] = []
+        self.stage = Stage.SEARCHING
         self.turn: tuple[int, int] = (1, 1)
         self._progress = progress
         self._simulations_before = 0
@@ -141,6 +142,18 @@ class Search:
     def simulations(self) -> int:
         """Behind all refinements."""
         return self._simulations_before + self.residuals.simulations
+
+    def screened(self, start: Array, others: Sequence[Array], searches: int) -> Array:
+        """The cost at other starts than the told one, of which the best will be searched from.
+
+        searches : that are to come, at most
+        """
+        if not others:
+            return np.zeros(0)
+        self.stage, self.turn = Stage.SCREENING, (0, searches)
+        r = self.residuals.vector(start)
+        self._tell(start, r, self.residuals.cost(start, r))
+        return self.residuals.costs(others)
 
     def weigh(self, residuals: Residuals) -> None:
         """Go on with other residuals of the same variables, whose costs do not compare."""
@@ -210,8 +223,7 @@ class Search:
         if cost < self._best_cost:
             self._best, self._best_cost = (x.copy(), r), cost
         self.cost_history.append(self._best_cost)
-        if self._progress is not None:
-            self._progress(self._state())
+        self._tell(*self._best, self._best_cost)
         rows, _ = self.residuals.reweighted(x, r)
         return np.append(condensed_residuals(rows, len(x)), np.sqrt(2.0 * cost))
 
@@ -229,16 +241,21 @@ class Search:
                 raise _SameBasin(minimum)
         return np.vstack([condensed_jacobian(rows, slopes), np.zeros(len(x))])
 
-    def _state(self) -> Progress:
-        x, r = self._best
+    def _tell(self, x: Array, r: Array, cost: float) -> None:
+        """Tell of x as the best so far."""
+        if self._progress is None:
+            return
         problem = self.residuals.problem
         values = problem.values(x).tolist()
-        return Progress(
-            evaluations=self.evaluations,
-            simulations=self.simulations,
-            cost=self.cost_history[-1],
-            parameters={one.name: v for one, v in zip(problem.free, values, strict=True)},
-            fit_percent=self.residuals.percents(r),
-            search=self.turn[0],
-            searches=self.turn[1],
+        self._progress(
+            Progress(
+                evaluations=self.evaluations,
+                simulations=self.simulations,
+                cost=cost,
+                parameters={one.name: v for one, v in zip(problem.free, values, strict=True)},
+                fit_percent=self.residuals.percents(r),
+                stage=self.stage,
+                search=self.turn[0],
+                searches=self.turn[1],
+            )
         )

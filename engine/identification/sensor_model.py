@@ -100,6 +100,11 @@ class SensorModel:
         """Standard deviation by channel where it is fixed."""
         return {name: one["noise"] for name, one in self.fixed.items() if "noise" in one}
 
+    @property
+    def finds_noise(self) -> bool:
+        """Whether the noise of any channel is to be found."""
+        return any(self.fits_noise(name) for name in self.fitted)
+
     def fits_noise(self, name: str) -> bool:
         """Whether the noise of a channel is to be found."""
         return "noise" in self.fitted.get(name, ())

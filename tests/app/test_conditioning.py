@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from ridetune.app.recordings import as_stated, stated
 from ridetune.engine.conditioning.chain import condition, steps_from_json
-from ridetune.engine.measurement import parse_run, run_to_csv
+from ridetune.engine.measurement import parse_run, read_run, run_to_csv
 from ridetune.engine.run_notes import notes_of
 from ridetune.engine.step_record import step_record_to_json
-from ridetune.engine.vehicle_file import vehicle_to_json
+from ridetune.engine.vehicle_file import vehicle_from_json, vehicle_to_json
 
 from ..factories import paper_vehicle
 from ..raw_sensors import drive, recorded
@@ -56,6 +56,25 @@ def test_a_raw_recording_becomes_one_to_identify_from(visitor, kept, raw):
     assert visitor.get(f"/measurements/{kept['id']}").json() == measurement
     # The vehicle is the session's at that time, and stays.
     assert done["vehicle"] == visitor.get().json()["vehicle"]
+
+
+def test_a_conditioned_recording_is_saved_with_the_record_of_its_steps(
+    visitor, kept, raw, tmp_path
+):
+    """Oracle: the same steps done by the engine."""
+    suggestion = visitor.get(address(kept)).json()["suggestion"]
+    visitor.put(address(kept), json={"steps": suggestion["steps"]})
+    for name in ("run.csv", "run.toml"):
+        saved = visitor.get(f"/measurements/{kept['id']}/{name}")
+        (tmp_path / name).write_bytes(saved.content)
+    vehicle = vehicle_from_json(visitor.get("/vehicle").json())
+    steps = steps_from_json(suggestion["steps"])
+    sent = parse_run(run_to_csv(raw).encode(), "raw.csv")
+    expected, found = condition(sent, steps, vehicle), read_run(tmp_path / "run.csv")
+    assert list(found.columns) == list(expected.columns)
+    for name in found.columns:
+        np.testing.assert_allclose(found[name], expected[name], rtol=1e-11)
+    assert [one.step for one in found.conditioning] == [one.step for one in expected.conditioning]
 
 
 def test_the_original_and_its_histories_can_still_be_had(visitor, kept, raw):

@@ -126,7 +126,12 @@ def test_what_a_job_shows_repeats_its_fit(engineer):
     ]
     assert first["result"]["fixed_sensors"] == {"chassis.pitch": {"delay": 0.005}}
     assert first["priors"] == {"front.pivot.angle": [0.07, 0.05]}
-    assert first["progress"]["searches"] == first["result"]["starts"] == 3
+    assert first["result"]["starts"] == 3
+    # At the end every minimum is refined with the noise that was found.
+    told = {name: first["progress"][name] for name in ("stage", "search", "searches")}
+    minima = len(first["result"]["minima"])
+    assert told == {"stage": "reweighing", "search": minima, "searches": minima}
+    assert first["progress"]["seconds_left"] is None
     assert sum(one["starts"] for one in first["result"]["minima"]) == 3
 
 

@@ -4,8 +4,11 @@ import json
 
 import numpy as np
 import pytest
+from ridetune.app.cli import main
 from ridetune.app.recordings import as_stated, stated
 from ridetune.engine.formats.child import ChildTable
+from ridetune.engine.mapping.mapping import read_mapping
+from ridetune.engine.mapping.reading import read_recording
 from ridetune.engine.measurement import read_run
 
 from .conftest import SAMPLES, short_recording
@@ -133,6 +136,30 @@ def test_what_is_proposed_can_be_put_and_signs_are_offered(visitor, kept):
     )
     sure = visitor.put(f"{path}/mapping", json=proposed).json()
     assert sure == found | {"mapping": proposed, "sign_suggestions": []}
+
+
+def test_a_mapping_and_its_run_are_saved_for_the_command_line(visitor, kept, tmp_path, capsys):
+    """Oracle: `ridetune channels` takes the mapping for the file's own, and the run is the same."""
+    path = f"/measurements/{kept['id']}"
+    reply = visitor.get(f"{path}/mapping")
+    assert (reply.status_code, reply.json()["code"]) == (404, "not-found")
+    mapping = visitor.get(f"{path}/columns").json()["proposed"]
+    next(one for one in mapping["columns"] if one["channel"] == "chassis.pitch")["sign"] = -1
+    visitor.put(f"{path}/mapping", json=mapping)
+    saved = {name: visitor.get(f"{path}/{name}") for name in ("mapping", "run.csv", "run.toml")}
+    assert saved["mapping"].json() == mapping
+    named = [one.headers["content-disposition"].partition("''")[2] for one in saved.values()]
+    assert named == ["lap-mapping.json", "lap-run.csv", "lap-run.toml"]
+    for name, one in zip(named, saved.values(), strict=True):
+        (tmp_path / name).write_bytes(one.content)
+    (tmp_path / "lap.csv").write_bytes(foreign(turned=("chassis.pitch",)))
+    assert main(["channels", str(tmp_path / "lap.csv"), "--mapping", str(tmp_path / named[0])]) == 0
+    assert "Warning" not in capsys.readouterr().out
+    by_mapping = read_recording(tmp_path / "lap.csv", read_mapping(tmp_path / named[0]))
+    by_names = read_run(tmp_path / named[1])
+    assert list(by_names.columns) == list(by_mapping.columns)
+    for name in by_mapping.columns:
+        np.testing.assert_allclose(by_names[name], by_mapping[name], rtol=1e-11)
 
 
 def test_a_mapped_file_is_a_measurement_like_any_other(visitor, kept):

@@ -50,6 +50,27 @@ def test_every_kind_of_recording_is_an_upload(visitor, tmp_path, name):
     assert extremes == pytest.approx([z.min(), z.max()], rel=1e-15, abs=1e-3 * off)
 
 
+def test_the_same_drive_under_another_name_is_remarked(visitor):
+    """The same bytes, and the same samples in other bytes; never a drive that differs in one."""
+    data = short_recording()
+    first = visitor.upload(data, "lap.csv").json()
+    assert (first["same_data_as"], first["remarks"]) == (None, [])
+    copies = {"monday.csv": data, "windows.csv": data.replace(b"\n", b"\r\n")}
+    for name, copy in copies.items():
+        found = visitor.upload(copy, name).json()
+        assert found["same_data_as"] == first["id"]
+        assert found["remarks"] == [
+            "It holds the same data as lap.csv; a fit to both would count that drive twice."
+        ]
+        assert visitor.get(f"/measurements/{found['id']}").json() == found
+        assert visitor.get().json()["measurements"][-1] == found
+    head, last = data.rstrip(b"\n").rsplit(b"\n", 1)
+    cells = last.split(b",")
+    cells[1] = b"0.0009"
+    other = visitor.upload(b"\n".join([head, b",".join(cells), b""]), "other.csv").json()
+    assert other["same_data_as"] is None
+
+
 def test_a_bare_body_is_an_upload_too(visitor):
     data = short_recording()
     reply = visitor.post("/measurements?name=bare.csv", content=data)

@@ -44,6 +44,43 @@ def test_the_vehicle_is_replaced_and_the_baseline_stays(visitor):
     assert visitor.get("/baseline").json() == vehicle
 
 
+def test_the_set_up_of_the_next_fit_is_kept_with_the_session(visitor):
+    """It has the fields of an identification; what it leaves out is what an identification does."""
+    assert visitor.get("/setup").json() is None
+    run = visitor.get("/measurements").json()[0]["id"]
+    told = {
+        "ride": {"kind": "measurement", "id": run, "key": None},
+        "use": {run: "hold_out"},
+        "fixed": ["front.pivot.angle"],
+        "bounds": {"front.suspension.stiffness": [12e3, None]},
+        "priors": {"rear.suspension.damping": [1500.0, 50.0]},
+        "settings": {"output_highpass_hz": 0.3},
+        "sensors": {"chassis.z": {"delay": "fit"}},
+        "loss": "huber",
+    }
+    kept = visitor.put("/setup", json=told).json()
+    assert visitor.get("/setup").json() == visitor.get().json()["setup"] == kept
+    settings = visitor.client.get("/api/rims-settings").json()
+    assert kept["settings"] == settings | {"output_highpass_hz": 0.3}
+    assert {name: kept[name] for name in told if name != "settings"} == {
+        name: value for name, value in told.items() if name != "settings"
+    }
+    fit = visitor.submit("identifications", {"runs": [run]})
+    for name in ("traction", "starts", "seed", "loss_scale", "noise", "braking", "fit_noise"):
+        assert kept[name] == fit[name]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "field"),
+    [({"use": {"x": "holdout"}}, "use"), ({"starts": 0}, "starts"), ({"starst": 2}, "starst")],
+)
+def test_a_set_up_that_no_fit_could_have_is_refused(visitor, wrong, field):
+    reply = visitor.put("/setup", json=wrong)
+    assert reply.status_code == 422
+    assert reply.json()["field"].startswith(field)
+    assert visitor.get("/setup").json() is None
+
+
 def test_a_misspelt_vehicle_is_refused_and_the_old_one_kept(visitor):
     """The sentence names the field and the nearest known one."""
     before = visitor.get("/vehicle").json()

@@ -97,7 +97,7 @@ def test_a_database_of_another_version_is_refused(tmp_path):
     DataDirectory(tmp_path).close()
 
 
-@pytest.mark.parametrize("version", [1, 2, 3, 4])
+@pytest.mark.parametrize("version", [1, 2, 3, 4, 5])
 def test_a_database_of_an_earlier_version_is_taken_over(tmp_path, version):
     """Oracle: what it kept; afterwards it keeps all that is new since like any other."""
     store = Store(tmp_path, Limits())
@@ -106,7 +106,9 @@ def test_a_database_of_an_earlier_version_is_taken_over(tmp_path, version):
     store.jobs.finish(done, "done", result={"cost": 1.5})
     store.close()
     with sqlite3.connect(tmp_path / "ridetune.sqlite") as connection:
-        connection.execute("ALTER TABLE measurements DROP COLUMN conditioned")
+        connection.execute("ALTER TABLE sessions DROP COLUMN setup")
+        if version < 5:
+            connection.execute("ALTER TABLE measurements DROP COLUMN conditioned")
         if version < 4:
             for column in ("mapping", "conditioning"):
                 connection.execute(f"ALTER TABLE measurements DROP COLUMN {column}")
@@ -127,6 +129,9 @@ def test_a_database_of_an_earlier_version_is_taken_over(tmp_path, version):
     assert done.conditioning == {"steps": [], "vehicle": None}
     noted = store.set_notes(session, kept.id, {}, [{"step": {"kind": "rest"}}], kept.summary)
     assert noted.conditioned == [{"step": {"kind": "rest"}}]
+    assert store.session(session).setup is None
+    store.set_setup(session, {"starts": 16})
+    assert store.session(session).setup == {"starts": 16}
     assert store.set_manoeuvre(session, kept.id, {"name": "lap"}).manoeuvre == {"name": "lap"}
     assert store.finish_job(job, "done", result={}, file=b"rows")
     store.close()

@@ -104,7 +104,7 @@ def test_an_uploaded_file_is_identified(visitor):
     visitor.page.get_by_role("button", name="Use as ride").click()
 
     visitor.click("#tab-identification")
-    for name, role in (("detailed_manoeuvre_1.csv", "holdout"), ("my_ride.csv", "fit")):
+    for name, role in (("detailed_manoeuvre_1.csv", "hold_out"), ("my_ride.csv", "fit")):
         assert visitor.page.get_by_label(f"Use of {name}").input_value() == role
     free_only(visitor, "KF", "CF", "KR", "CR")
     visitor.click("#start")
@@ -224,7 +224,7 @@ def test_files_of_one_name_are_told_apart(visitor):
     visitor.click("#tab-identification")
     for name in rides:
         use = visitor.page.get_by_label(f"Use of {name}", exact=True)
-        use.select_option("holdout" if name == rides[1] else "fit")
+        use.select_option("hold_out" if name == rides[1] else "fit")
     free_only(visitor, "KF")
     visitor.click("#start")
     visitor.until("ridetune.state('fit') !== null", 120)
@@ -256,14 +256,34 @@ def test_the_same_data_is_kept_once_and_never_scored_as_unseen(visitor):
     visitor.click("#tab-identification")
     assert "the same data as detailed_manoeuvre_1.csv" in visitor.element(".runs").inner_text()
     use = visitor.page.get_by_label("Use of copy.csv")
-    assert use.input_value() == "no"
-    use.select_option("holdout")
+    assert use.input_value() == "leave_out"
+    use.select_option("hold_out")
     free_only(visitor, "KF")
     visitor.click("#start")
     visitor.until("ridetune.state('fit') !== null", 120)
     scored = visitor.element(".held-out").all_inner_texts()
     assert len(scored) == 1
     assert "detailed_manoeuvre_2" in scored[0].replace("\n", "")
+
+
+def test_the_same_drive_written_otherwise_is_told_and_left_out(visitor):
+    visitor.click("#tab-measurements")
+    data = (SAMPLES / "detailed/manoeuvre_1.csv").read_bytes()
+    add_file(visitor, "windows.csv", data.replace(b"\n", b"\r\n"))
+    notice = visitor.element(".notice")
+    visitor.wait(notice.is_visible, "it is told")
+    told = "windows.csv holds the same data as detailed_manoeuvre_1.csv"
+    assert told in notice.inner_text()
+    assert visitor.look("ridetune.state('measurements').length") == 3
+    visitor.click("#tab-identification")
+    use = visitor.page.get_by_label("Use of windows.csv")
+    assert use.input_value() == "leave_out"
+    runs = visitor.element(".runs")
+    assert "counts twice" not in runs.inner_text()
+    use.focus()
+    use.select_option("fit")
+    assert "which so counts twice" in runs.inner_text()
+    assert use.evaluate("(field) => field === document.activeElement")
 
 
 def test_an_upload_with_warnings_leads_to_them(visitor):
@@ -314,13 +334,13 @@ def test_a_known_number_keeps_the_hand_in_its_field(visitor):
     assert mass.input_value() == "1100"
 
 
-def test_two_slope_dampers_are_switched_on_and_off(visitor):
-    """Four more sliders and rows; the start's slopes change the ride, and off is as before."""
+def test_the_car_s_two_slope_dampers_are_switched_on_and_off(visitor):
+    """Four more sliders and rows; the slopes change the ride, and off is as before."""
     before = visitor.line("chassis.z")
     visitor.click("#tab-identification")
     rows = visitor.element(".free tbody tr")
     assert rows.count() == 12
-    visitor.click("#two-slope")
+    visitor.click("#bent")
     visitor.settled()
     assert rows.count() == 16
     assert visitor.value("front.suspension.rebound_ratio") == 1.5
@@ -328,11 +348,47 @@ def test_two_slope_dampers_are_switched_on_and_off(visitor):
     assert ratio.locator("td.unit").inner_text() == ""
     assert visitor.element("#value-rear-suspension-knee_speed").input_value() == "0.5"
     assert np.abs(visitor.line("chassis.z") - before).max() > 0.1
-    visitor.click("#two-slope")
+    visitor.click("#bent")
     visitor.settled()
     assert rows.count() == 12
     assert not visitor.element("#value-rear-suspension-knee_speed").is_visible()
     np.testing.assert_allclose(visitor.line("chassis.z"), before, atol=1e-9)
+
+
+def test_finding_two_slope_dampers_leaves_the_car_on_show(visitor):
+    """Oracle: the line of before; the fit's own starts, 1.5 and 0.5 m/s, and its bounds."""
+    before = visitor.line("chassis.z")
+    visitor.click("#tab-identification")
+    box, rows = visitor.element("#two-slope"), visitor.element(".free tbody tr")
+    box.check()
+    assert rows.count() == 16
+    assert [*visitor.look("ridetune.state('values')")] == list(PARAMETER_NAMES)
+    visitor.settled()
+    np.testing.assert_array_equal(visitor.line("chassis.z"), before)
+    assert not visitor.element("#bent").is_checked()
+    visitor.until("ridetune.state('defaultBounds')?.bounds['rear.suspension.knee_speed']")
+    ratio = visitor.page.get_by_label("Lower bound of Front rebound ratio")
+    visitor.wait(lambda: ratio.input_value() == "0.2", "the bounds are there")
+    for name in ("Front rebound ratio", "Rear rebound ratio", "Rear knee speed"):
+        visitor.page.get_by_label(f"{name} is free").uncheck()
+    visitor.page.get_by_label("Front knee speed is free").click()
+    assert not box.is_checked()
+    assert box.evaluate("(box) => box === document.activeElement")
+    assert rows.count() == 12
+    box.check()
+    visitor.click("#start")
+    visitor.until("ridetune.state('fit') !== null", 150)
+    assert set(visitor.look("ridetune.job().free")) == set(ALL_NAMES)
+    starts = visitor.look("ridetune.job().start")
+    assert (starts["front.suspension.rebound_ratio"], starts["rear.suspension.knee_speed"]) == (
+        1.5,
+        0.5,
+    )
+    np.testing.assert_array_equal(visitor.line("chassis.z", "reference"), before)
+    visitor.click("#apply")
+    visitor.settled()
+    assert visitor.element("#bent").is_checked()
+    assert visitor.element("#value-rear-suspension-knee_speed").is_visible()
 
 
 def test_dampers_that_a_car_brings_along_are_known_until_they_are_freed(visitor):
@@ -368,7 +424,7 @@ def test_dampers_that_a_car_brings_along_are_known_until_they_are_freed(visitor)
     bring()
     rows = visitor.element(".free tbody tr")
     assert rows.count() == 16
-    assert visitor.element("#two-slope").is_checked()
+    assert not visitor.element("#two-slope").is_checked()
     assert freed() == set(PARAMETER_NAMES)
     visitor.page.get_by_label("Front rebound ratio is free").check()
     assert freed() == {*PARAMETER_NAMES, "front.suspension.rebound_ratio"}
@@ -380,8 +436,7 @@ def test_dampers_that_a_car_brings_along_are_known_until_they_are_freed(visitor)
 
 
 def test_a_ratio_is_told_without_a_unit(visitor):
-    visitor.click("#tab-identification")
-    visitor.click("#two-slope")
+    visitor.click("#bent")
     ratio = visitor.element("#value-front-suspension-rebound_ratio")
     label = visitor.page.get_by_text("Rebound ratio").first
     assert "rebound over that in jounce" in label.get_attribute("title")

@@ -1,5 +1,8 @@
 """From a file of another house to a run that can be fitted, as a visitor of the page does it."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 from ridetune.engine.measurement import read_run, run_to_csv
@@ -119,6 +122,11 @@ def test_a_foreign_csv_is_mapped_corrected_flipped_and_its_mapping_kept(visitor)
         values = run[name][::10]
         assert found[name] == pytest.approx((values.min(), values.max()), abs=1e-6)
 
+    with page.expect_download() as saved:
+        page.locator("#intake").get_by_text("Download mapping").click()
+    assert saved.value.suggested_filename == "fahrt-mapping.json"
+    assert json.loads(Path(saved.value.path()).read_text()) == kept["mapping"]
+
     page.fill("#template-name", "test bench 7")
     visitor.click("#save-template")
     visitor.wait(lambda: "Kept as test bench 7" in said(visitor), "the mapping is kept")
@@ -201,6 +209,11 @@ def test_a_raw_recording_is_conditioned_until_it_can_be_fitted(visitor):
     visitor.wait(lambda: "took off" in steps.first.inner_text(), "what was done is told")
     made = page.locator("#conditioned-channel")
     assert made.input_value() == "chassis.z"
+    with page.expect_download() as saved:
+        page.locator("#intake").get_by_text("Download CSV").click()
+    assert saved.value.suggested_filename == "raw-run.csv"
+    titles = Path(saved.value.path()).read_text().partition("\n")[0]
+    assert "chassis.z [m]" in titles
     visitor.click("#use-highpass")
     assert visitor.look("ridetune.state('rimsSettings').output_highpass_hz") == pytest.approx(0.6)
     visitor.click("#intake-ride")

@@ -31,7 +31,7 @@ def test_no_tab_cuts_off_what_it_says(visitor, tab):
     for part in visitor.element(f"#{tab} details").all():
         part.evaluate("(part) => { part.open = true; }")
     for role in visitor.element(f"#{tab}").get_by_label("Use of").all():
-        role.select_option("no")
+        role.select_option("leave_out")
     visitor.settled()
     assert cut_off(visitor) == []
     assert visitor.page.evaluate("document.documentElement.scrollHeight - innerHeight") == 0
@@ -65,7 +65,7 @@ def test_no_view_of_a_fit_cuts_off_what_it_says(visitor):
     page.get_by_role("button", name="Use as ride").click()
     visitor.click("#tab-identification")
     for name in ("detailed_manoeuvre_1.csv", "detailed_manoeuvre_2.csv"):
-        page.get_by_label(f"Use of {name}").select_option("no")
+        page.get_by_label(f"Use of {name}").select_option("leave_out")
     for row in visitor.element(".free tbody tr").all()[4:]:
         row.locator("input[type=checkbox]").uncheck()
     visitor.click("summary:has-text('Search')")

@@ -23,7 +23,7 @@ def change(visitor: Visitor, label: str, text: str) -> None:
 def test_filters_and_initial_state_act_on_the_ride_and_on_the_fit(visitor):
     """Oracle: the line moves with each choice and comes back with it; the fit keeps them."""
     visitor.click("#tab-identification")
-    visitor.click("text=How recordings drive the model")
+    visitor.click("text=How recordings drive the model: as usual")
     before = visitor.line("chassis.pitch")
     change(visitor, "Low-pass of the wheel centres", "2")
     filtered = visitor.line("chassis.pitch")
@@ -36,11 +36,72 @@ def test_filters_and_initial_state_act_on_the_ride_and_on_the_fit(visitor):
     np.testing.assert_array_equal(visitor.line("chassis.pitch"), before)
 
     change(visitor, "Low-pass of the longitudinal acceleration", "")
+    change(visitor, "High-pass of the compared channels", "0.3")
+    visitor.page.select_option("#traction", "paper")
+    driven = visitor.page.locator("summary", has_text="How recordings drive the model")
+    driven.click()
+    assert driven.inner_text() == (
+        "How recordings drive the model: aₓ unfiltered; z, pitch, roll above 0.3 Hz; "
+        "paper's traction"
+    )
+    driven.click()
+    change(visitor, "High-pass of the compared channels", "")
+    visitor.page.select_option("#traction", "exact")
+    assert driven.inner_text() == "How recordings drive the model: aₓ unfiltered"
     free_only(visitor, "KF")
     visitor.click("#start")
     visitor.until("ridetune.state('fit') !== null", 120)
     settings = visitor.look("ridetune.job().result.settings")
     assert (settings["a_x_cutoff_hz"], settings["rim_cutoff_hz"]) == (None, 50)
+
+
+def test_what_decides_a_fit_survives_a_reload(visitor):
+    """Oracle: after a reload, Identify asks for the very fit that was set up before."""
+    visitor.page.select_option("#ride", label="detailed_manoeuvre_2.csv")
+    visitor.click("#tab-identification")
+    visitor.page.get_by_label("Use of detailed_manoeuvre_1.csv").select_option("fit")
+    visitor.page.get_by_label("Use of detailed_manoeuvre_2.csv").select_option("leave_out")
+    change(visitor, "When detailed_manoeuvre_1.csv brakes", "none")
+    for summary in ("How recordings drive", "Noise:", "Search:", "Sensors:", "Known before:"):
+        visitor.page.locator("summary", has_text=summary).click()
+    visitor.page.select_option("#traction", "paper")
+    visitor.page.select_option("#initial-state", "measured")
+    change(visitor, "High-pass of the compared channels", "0.3")
+    visitor.page.get_by_role("spinbutton", name="Noise of z,").fill("0.7")
+    visitor.element("#search-starts").fill("2")
+    visitor.element("#search-seed").fill("5")
+    visitor.page.select_option("#loss", "huber")
+    visitor.page.get_by_label("Find the noise of z, pitch and roll").check()
+    change(visitor, "Delay of Chassis roll, ms, or fit", "fit")
+    change(visitor, "Mean of Rear damping known before", "1500")
+    change(visitor, "Standard deviation of Rear damping known before", "70")
+    change(visitor, "Lower bound of Front spring stiffness", "12")
+    visitor.page.get_by_label("Front pivot angle is free").uncheck()
+
+    def asked():
+        with visitor.page.expect_request("**/identifications") as sent:
+            visitor.click("#start")
+        visitor.until("ridetune.job() !== null")
+        visitor.click("#cancel")
+        visitor.until("ridetune.job().state === 'cancelled'")
+        told = sent.value.post_data_json
+        del told["key"]
+        return told
+
+    before = asked()
+    first, second = (one["id"] for one in visitor.look("ridetune.state('measurements')"))
+    assert before["runs"] == [first]
+    assert before["settings"]["output_highpass_hz"] == 0.3
+    assert before["sensors"] == {"chassis.roll": {"delay": "fit"}}
+    assert before["priors"] == {"rear.suspension.damping": [1500, 70]}
+    assert before["bounds"]["front.suspension.stiffness"][0] == 12e3
+    assert (before["starts"], before["seed"], before["loss"]) == (2, 5, "huber")
+    visitor.wait(lambda: not visitor.look("ridetune.unsaved()"), "the set-up is saved")
+    visitor.page.reload()
+    visitor.wait_until_drawn()
+    assert visitor.look("ridetune.state('ride').id") == second
+    visitor.click("#tab-identification")
+    assert asked() == before
 
 
 def test_braking_is_marked_run_by_run(visitor):

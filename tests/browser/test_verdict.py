@@ -1,5 +1,7 @@
 """What a fit is worth, on the page: verdict, correlation, profile, next run, error band, search."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -21,7 +23,7 @@ def analyst(visitor):
     visitor.page.get_by_role("button", name="Use as ride").click()
     visitor.click("#tab-identification")
     for name in ("detailed_manoeuvre_1.csv", "detailed_manoeuvre_2.csv"):
-        visitor.page.get_by_label(f"Use of {name}").select_option("no")
+        visitor.page.get_by_label(f"Use of {name}").select_option("leave_out")
     return visitor
 
 
@@ -44,6 +46,10 @@ def test_a_fit_tells_what_its_run_determines_and_what_to_drive_next(analyst):
     [rate] = [one for one in fit["verdict"]["combinations"] if one["name"] == "front.bar_rate"]
     assert f"{rate['value'] / 1000:.4g} N/mm" in said
     assert visitor.element(".direction").first.inner_text()
+
+    # Of a single start there are no minima to compare, and it is told how to get some.
+    page.locator("#fit-minima").click()
+    assert "from one start" in visitor.element("#identification").inner_text()
 
     # The pair is marked by more than its colour, and read by the keyboard.
     page.locator("#fit-correlation").click()
@@ -144,8 +150,15 @@ def test_a_search_is_told_of_starts_outliers_and_priors(analyst):
     assert summaries["Search"].inner_text() == "Search: 8 starts, Huber from 3 noises"
     assert summaries["Known before"].inner_text().replace("\n", "") == "Known before: dR"
 
-    fit = fitted(visitor)
-    job = visitor.look("ridetune.job()")
+    # While it runs, it tells which search it is at and how long the others take.
+    visitor.click("#start")
+    stage = page.locator("#stage-of-fit")
+    told = re.compile(r"Search [3-8] of [3-8], .* best of 8 starts; about \d+ s left\.")
+    visitor.wait(
+        lambda: any(told.match(text) for text in stage.all_inner_texts()), "the search is told"
+    )
+    visitor.until("ridetune.state('fit') !== null", 150)
+    fit, job = visitor.look("ridetune.state('fit')"), visitor.look("ridetune.job()")
     assert (job["starts"], job["loss"]) == (8, "huber")
     assert job["priors"] == {"rear.pivot.distance": [1.1, 0.05]}
     page.locator("#fit-minima").click()

@@ -169,6 +169,10 @@ def test_starts_repeat_with_their_seed_and_fill_the_box():
 def test_progress_counts_the_searches_and_its_cost_never_rises():
     told = []
     found = identify(asked(), starts=64, simulate=simulate, progress=told.append)
+    screening = told.pop(0)
+    assert (screening.stage, screening.search, screening.searches) == ("screening", 0, REFINED)
+    assert screening.cost >= told[0].cost
+    assert {one.stage for one in told} == {"searching"}
     assert [one.search for one in told] == sorted(one.search for one in told)
     assert {one.searches for one in told} == {REFINED}
     assert told[-1].search == REFINED
