@@ -18,7 +18,7 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.signal.windows import tukey
+from scipy.signal import windows
 
 from ..channels import Run
 from ..errors import ConditioningError
@@ -164,7 +164,7 @@ def find_lag(
     longest : s; a delay beyond it means that there is no maximum within
     """
     step = float(time[-1] - time[0]) / (len(time) - 1)
-    window = tukey(len(time), TAPERED)
+    window = windows.tukey(len(time), TAPERED)
     later, earlier = (np.fft.rfft(window * in_band(time, one, band)) for one in (values, reference))
     w = 2.0 * np.pi * np.fft.rfftfreq(len(time), step)
     # What the window leaks out of the band, an integral would blow up.

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats.qmc import Halton
+from scipy.stats import qmc  # its own name would lock out another thread that imports scipy.stats
 
 from ..channels import WHEEL_CHANNELS
 from ..errors import ProblemError
@@ -205,7 +205,7 @@ def _usable_start(residuals: Residuals, x: Array) -> tuple[Array, list[str]]:
         return x, []
     reach = np.where([one.logarithmic for one in residuals.problem.variables], 1.0, 2.0)
     # The sequence begins at the lower bounds.
-    spread = Halton(len(x), scramble=False).fast_forward(1).random(SCATTERED_STARTS)
+    spread = qmc.Halton(len(x), scramble=False).fast_forward(1).random(SCATTERED_STARTS)
     near = np.maximum(residuals.lower, x - reach), np.minimum(residuals.upper, x + reach)
     of_sensors = np.arange(len(x)) >= len(residuals.problem.free)
     for where, ends in (

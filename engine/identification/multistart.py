@@ -10,7 +10,7 @@ and so told.
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats.qmc import Sobol
+from scipy.stats import qmc
 
 from .fit import Ending, Stage
 from .search import Found, Search
@@ -37,7 +37,7 @@ def spread(lower: Array, upper: Array, count: int, seed: int) -> list[Array]:
     """`count` points between the bounds, of a Sobol sequence scrambled by `seed`."""
     if count < 1:
         return []
-    sequence = Sobol(len(lower), scramble=True, rng=seed)
+    sequence = qmc.Sobol(len(lower), scramble=True, rng=seed)
     # The balance of the sequence is that of a power of two; of one, its first points are taken.
     shares = sequence.random_base2(int(np.ceil(np.log2(count))))[:count]
     return [lower + (upper - lower) * share for share in shares]
