@@ -154,13 +154,14 @@ const button = (text, label, usable, run) => h("button", { type: "button", class
   "aria-label": label, title: label, disabled: !usable, on: { click: run } }, text);
 
 /** What a step did. */
-function recordOf({ channels, numbers, band_hz: { low, high }, sentences }) {
+function recordOf({ channels, numbers, band_hz: { low, high }, sentences, warnings }) {
   const hertz = (value) => units.plain(value, 3);
   const band = low && high ? `True from ${hertz(low)} to ${hertz(high)} Hz.` : low ? `True above ${hertz(low)} Hz.`
     : high ? `True below ${hertz(high)} Hz.` : "";
   const found = Object.entries(numbers);
   return h("div", { className: "record" },
     sentences.map((text) => h("p", {}, text)),
+    warnings.length ? h("ul", { className: "warnings" }, warnings.map((text) => h("li", {}, text))) : null,
     band ? h("p", { className: "strong" }, band) : null,
     channels.length || found.length
       ? h("details", {}, h("summary", { className: "soft" }, "numbers"),

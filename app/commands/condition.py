@@ -34,6 +34,7 @@ def condition(options: Namespace) -> None:
     done = after(run, steps, vehicle)
     for record in done.conditioning[len(run.conditioning) :]:
         print(f"{record.step['kind']}: {' '.join(record.sentences)}")
+        print_warnings(record.warnings)
     print(f"{len(steps)} steps, {done.time.size} samples over {done.duration:.4g} s.")
     _print_use(done, suggestion)
     if options.output:

@@ -96,6 +96,7 @@ def _after(run: Run, step: Step, done: Done) -> Run:
         done.numbers,
         done.band_hz,
         done.sentences,
+        done.warnings,
     )
     return replace(
         run,

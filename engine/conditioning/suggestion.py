@@ -6,12 +6,15 @@ from typing import Literal
 import numpy as np
 
 from ..channels import INPUT_CHANNELS, OUTPUT_CHANNELS, Run, channel
+from ..errors import ConditioningError
 from ..filters import PAD_PERIODS, is_uniform
 from ..frames import CORNERS, Corner
 from ..spikes import spike_samples
 from ..vehicle import Vehicle
 from .calibration import Rest, speeds, standstill
-from .chain import Step
+from .chain import Step, condition
+from .delay import Delay
+from .lateness import find_lateness
 from .motion import TARGETS, Angles, Displacement, Gravity, Speed
 from .rims import RimFromTravel
 from .sampling import Despike, Fill, Resample
@@ -55,6 +58,7 @@ def suggest(run: Run, vehicle: Vehicle | None = None) -> Suggestion:
     """
     chain = _Chain(run, vehicle)
     chain.mend()
+    chain.bring_in_time()
     chain.count_from_rest()
     chain.drive()
     chain.turn()
@@ -78,9 +82,7 @@ class _Chain:
         self.steps: list[Step] = []
         self.reasons: list[str] = []
         self.banded = False
-        self.standing = standstill(run)
-        longest = float(np.ceil(100.0 * PAD_PERIODS / run.duration) / 100.0)
-        self.low, self.crossover = max(LOWEST, longest), max(CROSSOVER, longest)
+        self._measure(run)
         self.rate = (len(run.time) - 1) / run.duration
 
     def add(self, step: Step, reason: str, *makes: str) -> None:
@@ -88,6 +90,12 @@ class _Chain:
         self.steps.append(step)
         self.reasons.append(f"{step.kind}: {reason}")
         self.has.update(makes)
+
+    def _measure(self, run: Run) -> None:
+        """Where the car stands, and from which frequencies on the record is long enough."""
+        self.standing = standstill(run)
+        longest = float(np.ceil(100.0 * PAD_PERIODS / run.duration) / 100.0)
+        self.low, self.crossover = max(LOWEST, longest), max(CROSSOVER, longest)
 
     def mend(self) -> None:
         """Gaps, spikes and sampling."""
@@ -105,6 +113,23 @@ class _Chain:
         elif not is_uniform(run.time):
             even = float(max(1, round(self.rate)))
             self.add(Resample(even), "the samples are not evenly spaced.")
+
+    def bring_in_time(self) -> None:
+        """A speed or an acceleration that is clearly late against the accelerometer."""
+        gyro = "chassis.pitch" not in self.has and "chassis.pitch_rate" in self.has
+        by_speed = "chassis.a_x" not in self.has
+        if not gyro or (by_speed and "chassis.v_x" not in self.has):
+            return
+        try:
+            speed = [Speed(acceleration=True)] if by_speed else []
+            late = find_lateness(condition(self.run, [*self.steps, *speed]), self.crossover)
+        except ConditioningError:
+            # The step that cannot be done will say so itself.
+            return
+        if late is not None:
+            step = Delay(late.channel, seconds=round(late.lag.seconds, 3))
+            self.add(step, f"without it {late.seen}.")
+            self._measure(condition(self.run, self.steps))
 
     def count_from_rest(self) -> None:
         """Bias of raw sensors."""

@@ -120,6 +120,7 @@ def recorded_motion(run: Run, settings: RimsSettings) -> RecordedMotion:
         doubts=(
             *_sampling_warnings(run, settings),
             *_compared_below_band(run, settings),
+            *_doubtful_conditioning(run),
             *unknown_start,
         ),
     )
@@ -208,6 +209,15 @@ def _sampling_warnings(run: Run, settings: RimsSettings) -> list[str]:
         f"low-pass of {channel}, which is left out."
         for channel, cutoff in filters.items()
         if cutoff is not None and too_coarse(step, cutoff)
+    ]
+
+
+def _doubtful_conditioning(run: Run) -> list[str]:
+    """What the steps that made the channels say of them."""
+    return [
+        f"Run {run.name}, conditioning, {record.step['kind']}: {warning}"
+        for record in run.conditioning
+        for warning in record.warnings
     ]
 
 
