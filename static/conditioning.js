@@ -12,7 +12,7 @@ const SAMPLES = 1500;
 const EXCLUSIVE = { seconds: "reference", reference: "seconds" };
 
 let host = null;
-/** What is on show: row, raw (names of the channels recorded), suggestion, record, steps, applied (those in force), vehicle (of those), wrong (place of the step that was refused), channel, chosen (by hand). */
+/** What is on show: row, raw (names of the channels recorded), suggestion, kinds (a step of each, in the order in which they belong), record, steps, applied (those in force), vehicle (of those), wrong (place of the step that was refused), channel, chosen (by hand). */
 let at = null;
 let plot = null;
 const parts = {};
@@ -44,9 +44,9 @@ export function shown() {
 }
 
 /** What the service knows of the recording. */
-function took({ steps, record, suggestion, measurement, vehicle }) {
+function took({ steps, record, suggestion, kinds, measurement, vehicle }) {
   // A file may bring records of its own; those of the steps come behind them.
-  Object.assign(at, { row: measurement, applied: steps, suggestion, vehicle, wrong: null,
+  Object.assign(at, { row: measurement, applied: steps, suggestion, kinds, vehicle, wrong: null,
     record: steps.length ? record.slice(-steps.length) : [] });
   if (steps.length) at.steps = structuredClone(steps);
   const names = present();
@@ -178,11 +178,17 @@ const known = () => [...new Set([...at.raw, ...present(),
 
 function adding() {
   const choice = h("select", { id: "step-kind", "aria-label": "Kind of step to add" },
-    Object.entries(KINDS).map(([kind, { label, what }]) => h("option", { value: kind, title: what }, `${label}: ${what}`)));
+    at.kinds.map(({ kind }) => h("option", { value: kind, title: KINDS[kind].what }, `${KINDS[kind].label}: ${KINDS[kind].what}`)));
   return h("div", { className: "row-tools adding" }, choice,
-    h("button", { type: "button", id: "add-step",
-      on: { click: () => change([...at.steps, { kind: choice.value, ...structuredClone(KINDS[choice.value].fresh ?? {}) }]) } },
-    "Add step"));
+    h("button", { type: "button", id: "add-step", on: { click: () => add(choice.value) } }, "Add step"));
+}
+
+/** A step more, before those that belong behind it. */
+function add(kind) {
+  const rank = (one) => at.kinds.findIndex((other) => other.kind === one);
+  const behind = at.steps.findIndex((one) => rank(one.kind) > rank(kind));
+  const place = behind < 0 ? at.steps.length : behind;
+  change([...at.steps.slice(0, place), structuredClone(at.kinds[rank(kind)]), ...at.steps.slice(place)]);
 }
 
 function move(place, by) {

@@ -26,14 +26,16 @@ Step = (
     | Despike
     | Resample
     | Scale
-    | Rest
     | Delay
+    | Rest
     | Speed
     | Angles
     | Gravity
     | Displacement
     | RimFromTravel
 )
+"""In the order in which they belong."""
+
 Steps = tuple[Step, ...]
 
 MOST_STEPS = 100
