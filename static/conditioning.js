@@ -12,7 +12,7 @@ const SAMPLES = 1500;
 const EXCLUSIVE = { seconds: "reference", reference: "seconds" };
 
 let host = null;
-/** What is on show: row, raw (names of the channels recorded), suggestion, kinds (a step of each, in the order in which they belong), record, steps, applied (those in force), vehicle (of those), wrong (place of the step that was refused), channel, chosen (by hand). */
+/** What is on show: row, raw (names of the channels recorded), suggestion, kinds (a step of each, in the order in which they belong), record, above (Hz, what to compare the run above), steps, applied (those in force), vehicle (of those), wrong (place of the step that was refused), channel, chosen (by hand). */
 let at = null;
 let plot = null;
 const parts = {};
@@ -44,9 +44,9 @@ export function shown() {
 }
 
 /** What the service knows of the recording. */
-function took({ steps, record, suggestion, kinds, measurement, vehicle }) {
+function took({ steps, record, output_highpass_hz: above, suggestion, kinds, measurement, vehicle }) {
   // A file may bring records of its own; those of the steps come behind them.
-  Object.assign(at, { row: measurement, applied: steps, suggestion, kinds, vehicle, wrong: null,
+  Object.assign(at, { row: measurement, applied: steps, above, suggestion, kinds, vehicle, wrong: null,
     record: steps.length ? record.slice(-steps.length) : [] });
   if (steps.length) at.steps = structuredClone(steps);
   const names = present();
@@ -264,8 +264,8 @@ const outcome = () => [lacking(), highpass(),
 
 /** What is slower than a band is not known; an identification should not compare it. */
 function highpass() {
-  const wanted = at.suggestion.output_highpass_hz;
-  if (!wanted || !isApplied() || !at.record.some(({ band_hz: { low } }) => low)) return null;
+  const wanted = at.above;
+  if (!wanted || !isApplied()) return null;
   const { output_highpass_hz: now } = get("rimsSettings");
   const hertz = `${units.plain(wanted, 3)} Hz`;
   if (now !== null && now >= wanted) {

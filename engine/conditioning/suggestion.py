@@ -9,6 +9,7 @@ from ..channels import INPUT_CHANNELS, OUTPUT_CHANNELS, Run, channel
 from ..errors import ConditioningError
 from ..filters import PAD_PERIODS, is_uniform
 from ..frames import CORNERS, Corner
+from ..known_band import TIMES_LOWEST
 from ..spikes import spike_samples
 from ..vehicle import Vehicle
 from .calibration import Rest, speeds, standstill
@@ -24,9 +25,6 @@ FASTEST, RATE = 400.0, 200.0
 
 LOWEST, HIGHEST, CROSSOVER = 0.3, 50.0, 0.2
 """Band of displacements and crossover of angles, Hz, where the record allows them."""
-
-TIMES_LOWEST = 2.0
-"""What is in a band counts from so many times its lowest frequency on: 1/65 is missing there."""
 
 ANGLES: tuple[tuple[Literal["pitch", "roll"], str], ...] = (
     ("pitch", "chassis.body_a_x"),
@@ -69,7 +67,7 @@ def suggest(run: Run, vehicle: Vehicle | None = None) -> Suggestion:
         tuple(chain.steps),
         tuple(chain.reasons),
         chain.lacks(),
-        TIMES_LOWEST * chain.low if chain.banded else None,
+        TIMES_LOWEST * max(chain.lows) if chain.lows else None,
     )
 
 
@@ -81,7 +79,7 @@ class _Chain:
         self.has = set(run.columns)
         self.steps: list[Step] = []
         self.reasons: list[str] = []
-        self.banded = False
+        self.lows: list[float] = []
         self._measure(run)
         self.rate = (len(run.time) - 1) / run.duration
 
@@ -175,7 +173,7 @@ class _Chain:
             else:
                 step = Angles(angle, False, self.crossover)
                 self.add(step, f"{rate} gives {target} above {self.crossover:g} Hz.", target)
-                self.banded = True
+                self.lows.append(self.crossover)
 
     def upright(self) -> None:
         """Inertial accelerations from body-fixed ones."""
@@ -214,7 +212,7 @@ class _Chain:
         high = min(HIGHEST, 0.2 * self.rate)
         reason = f"{', '.join(names)} give {', '.join(targets)} in a band."
         self.add(Displacement(names, (self.low, high)), reason, *targets)
-        self.banded = True
+        self.lows.append(self.low)
 
     def lacks(self) -> tuple[str, ...]:
         """What is still missing, with the remedy."""

@@ -52,6 +52,8 @@ def test_a_raw_recording_becomes_one_to_identify_from(visitor, kept, raw):
     assert [one["step"] for one in done["record"]] == suggestion["steps"]
     assert all(one["sentences"] for one in done["record"])
     assert done["suggestion"] == suggestion
+    assert shown["output_highpass_hz"] is None
+    assert done["output_highpass_hz"] == suggestion["output_highpass_hz"]
     measurement = done["measurement"]
     assert measurement["usable_for_identification"] is True
     assert measurement["conditioning"] == suggestion["steps"]
