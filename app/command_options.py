@@ -37,6 +37,9 @@ def simulate(command: Parser) -> None:
 def channels(command: Parser) -> None:
     command.add_argument("recording", metavar="FILE", help="recording of any kind and any names")
     _add_mapping(command)
+    command.add_argument(
+        "--flip", metavar="CHANNEL", **SEVERAL, help="channels whose signs are turned over"
+    )
     command.add_argument("-o", "--output", metavar="FILE", help="the mapping as JSON")
 
 

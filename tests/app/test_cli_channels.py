@@ -56,10 +56,7 @@ def test_the_columns_are_shown_with_what_they_are_taken_for_and_why(foreign, cap
 
 def test_a_mapping_makes_a_foreign_recording_one_of_ours(foreign, capsys):
     """Once pitch is turned back, every number is that of the sample, to the digits written."""
-    main(["channels", "foreign.csv", "-o", "mapping.json"])
-    mapping = json.loads((foreign.parent / "mapping.json").read_text())
-    next(one for one in mapping["columns"] if one["channel"] == "chassis.pitch")["sign"] = -1
-    (foreign.parent / "mapping.json").write_text(json.dumps(mapping))
+    main(["channels", "foreign.csv", "--flip", "chassis.pitch", "-o", "mapping.json"])
     found, native = read_recording(foreign, read_mapping("mapping.json")), read_run(NATIVE)
     for name in TITLES:
         np.testing.assert_allclose(found[name], native[name], rtol=1e-10, atol=1e-12)
@@ -75,6 +72,47 @@ def test_a_mapping_makes_a_foreign_recording_one_of_ours(foreign, capsys):
     shown = [re.findall(r"^(chassis.(?:z|pitch)) +(\S+)$", one, re.M) for one in (mapped, ours)]
     assert shown[0] == shown[1]
     assert len(shown[0]) == 2
+
+
+def test_the_signs_of_named_channels_are_turned_over(foreign, capsys):
+    """Of the guess and of a mapping that is there already, whose confirmed sign is none then."""
+
+    def signs():
+        return {one.channel: one.sign for one in read_mapping("mapping.json").columns}
+
+    main(["channels", "foreign.csv", "-o", "mapping.json"])
+    guessed = signs()
+    flip = ["--flip", "chassis.pitch", "chassis.z", "-o", "mapping.json"]
+    capsys.readouterr()
+    assert main(["channels", "foreign.csv", *flip]) == 0
+    printed = capsys.readouterr().out
+    assert re.search(r"^Nickwinkel .* chassis.pitch +deg +-1 ", printed, re.M)
+    assert "chassis.pitch runs against" not in printed
+    turned = {name: -1 if name in flip else 1 for name in guessed}
+    assert signs() == {name: sign * turned[name] for name, sign in guessed.items()}
+    known = json.loads((foreign.parent / "mapping.json").read_text())
+    for one in known["columns"]:
+        one["sign_sure"] = True
+    (foreign.parent / "known.json").write_text(json.dumps(known))
+    command = ["channels", "foreign.csv", "--mapping", "known.json"]
+    assert main([*command, "--flip", "chassis.z", "--flip", "chassis.pitch", *flip[-2:]]) == 0
+    assert signs() == guessed
+    unsure = {one.channel for one in read_mapping("mapping.json").columns if not one.sign_sure}
+    assert unsure == {"chassis.z", "chassis.pitch"}
+
+
+@pytest.mark.parametrize(
+    ("flip", "sentence"),
+    [
+        (["chassis.pich"], "--flip chassis.pich: no column is taken for a channel chassis.pich"),
+        (["time"], "--flip time: no column is taken for a channel time that has a sign; name "),
+        (["chassis.z", "chassis.z"], "--flip chassis.z is given twice"),
+    ],
+)
+def test_a_sign_that_cannot_be_turned_over_is_refused(foreign, capsys, flip, sentence):
+    said = refused(capsys, "channels", "foreign.csv", "--flip", *flip, "-o", "mapping.json")
+    assert sentence in said
+    assert not (foreign.parent / "mapping.json").exists()
 
 
 @pytest.mark.parametrize(
