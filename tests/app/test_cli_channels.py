@@ -8,7 +8,7 @@ import pytest
 from ridetune.app.cli import main
 from ridetune.engine.mapping.mapping import read_mapping
 from ridetune.engine.mapping.reading import read_recording
-from ridetune.engine.measurement import read_run
+from ridetune.engine.measurement import read_run, write_run
 
 from .conftest import SAMPLES
 from .test_cli import refused
@@ -129,6 +129,64 @@ def test_other_names_without_a_mapping_are_refused_with_the_way(foreign, capsys,
     assert "foreign.csv: no column is called time" in said
     assert "run `ridetune channels foreign.csv -o mapping.json`" in said
     assert said.endswith("and add --mapping mapping.json.")
+
+
+def test_a_run_has_a_mapping_of_its_own(foreign, capsys):
+    """The halves of a recording, the second with other names. Oracle: the fit to both halves
+    by our names, whose numbers have eleven digits.
+    """
+    main(["channels", "foreign.csv", "--flip", "chassis.pitch", "-o", "first.json"])
+    title, *rows = foreign.read_text().splitlines()
+    foreign.write_text("\n".join([title, *rows[:2000]]))
+    (foreign.parent / "other.csv").write_text("\n".join(["a;b;c;d;e;f;g;h", *rows[2000:]]))
+    mapping = json.loads((foreign.parent / "first.json").read_text())
+    for one, name in zip(mapping["columns"], "abcdefgh", strict=True):
+        one["column"] = name
+    (foreign.parent / "second.json").write_text(json.dumps(mapping))
+    for name, under in (("foreign", "first"), ("other", "second")):
+        run = read_recording(f"{name}.csv", read_mapping(f"{under}.json"))
+        write_run(run, f"our_{name}.csv")
+
+    def fit(*runs):
+        free = ["--free", "K_F", "C_F", "-o", "fit.json"]
+        assert main(["identify", *runs, "--vehicle", "paper", *free]) == 0
+        found = json.loads((foreign.parent / "fit.json").read_text())
+        return [one["value"] for one in found["parameters"]]
+
+    ours = fit("our_foreign.csv", "our_other.csv")
+    runs = ["foreign.csv", "other.csv"]
+    for told in (
+        ["first.json", "other.csv=second.json"],
+        ["other.csv=second.json", "foreign.csv=first.json"],
+    ):
+        np.testing.assert_allclose(fit(*runs, "--mapping", *told), ours, rtol=1e-6)
+    validate = ["validate", runs[0], "--vehicle", "paper", "--free", "K_F", "-o", "report.html"]
+    held = ["--hold-out", runs[1], "--mapping", "first.json", "other.csv=second.json"]
+    assert main([*validate, *held]) == 0
+    advise = ["advise", *runs, "--vehicle", "fit.json", "--candidates", "heave"]
+    assert main([*advise, "--mapping", "first.json", "other.csv=second.json"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("told", "sentence"),
+    [
+        (
+            ["lap.csv=m.json"],
+            "--mapping lap.csv=m.json: there is no run lap.csv; there are foreign",
+        ),
+        (["=m.json"], "--mapping =m.json names no run or no file; write FILE or RUN=FILE."),
+        (["m.json", "n.json"], "--mapping n.json is a second mapping of the same runs; give one"),
+        (
+            ["foreign.csv=m.json", "foreign.csv=n.json"],
+            "--mapping foreign.csv=n.json is a second mapping of foreign.csv; give one",
+        ),
+    ],
+)
+@pytest.mark.parametrize("command", [["identify"], ["validate", "-o", "r.html"], ["advise"]])
+def test_a_mapping_that_is_no_run_s_is_refused(foreign, capsys, command, told, sentence):
+    name, *more = command
+    asked = [name, "foreign.csv", *more, "--vehicle", "paper", "--mapping", *told]
+    assert sentence in refused(capsys, *asked)
 
 
 def test_what_makes_no_sense_with_a_mapping_is_refused(foreign, capsys):
