@@ -18,6 +18,7 @@ from ridetune.app.cli import main
 from ridetune.engine.channels import Run
 from ridetune.engine.detailed.car_file import reference_car
 from ridetune.engine.detailed.plant import DetailedPlant
+from ridetune.engine.extras import how_to_install
 from ridetune.engine.measurement import read_run, write_run
 from ridetune.engine.parameters import PARAMETER_NAMES
 from ridetune.engine.sensors import RECORDED as SENSED
@@ -544,7 +545,7 @@ def test_a_campaign_that_cannot_be_driven_is_refused(folder, capsys, arguments, 
 def test_mdf4_without_its_package_says_what_to_install(folder, capsys, monkeypatch):
     monkeypatch.setattr("ridetune.engine.formats.readers.find_spec", lambda name: None)
     message = refused(capsys, "campaign", "--format", "mf4", "-o", "runs")
-    assert message.endswith("install ridetune[formats], or take CSV.")
+    assert message.endswith(f"not installed; {how_to_install('formats')}, or take CSV.")
     assert not list(folder.iterdir())
 
 
@@ -561,7 +562,7 @@ def test_the_detailed_car_drives_and_leaves_what_is_known_of_it(folder, capsys):
 def test_the_detailed_car_without_its_package_says_what_to_install(folder, capsys, monkeypatch):
     monkeypatch.setattr("ridetune.engine.detailed.exudyn_module.find_spec", lambda name: None)
     message = refused(capsys, "campaign", "--plant", "detailed", "-o", "runs")
-    assert message.endswith('install it: pip install "ridetune[detailed]"')
+    assert message.endswith(f"not installed; {how_to_install('detailed')}.")
     assert not list(folder.iterdir())
 
 
