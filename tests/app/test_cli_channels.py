@@ -10,8 +10,8 @@ from ridetune.engine.mapping.mapping import read_mapping
 from ridetune.engine.mapping.reading import read_recording
 from ridetune.engine.measurement import read_run, write_run
 
+from .command_line import refused
 from .conftest import SAMPLES
-from .test_cli import refused
 
 NATIVE = SAMPLES / "twin/manoeuvre_2.csv"
 TITLES = {
