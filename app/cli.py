@@ -103,8 +103,10 @@ def _serve(options: argparse.Namespace) -> None:
 
 def _simulate(options: argparse.Namespace) -> None:
     from .commands.simulate import simulate
+    from .compile import compiling_told
 
-    simulate(options)
+    with compiling_told():
+        simulate(options)
 
 
 def _channels(options: argparse.Namespace) -> None:
@@ -115,8 +117,10 @@ def _channels(options: argparse.Namespace) -> None:
 
 def _sweep(options: argparse.Namespace) -> None:
     from .commands.sweep import sweep
+    from .compile import compiling_told
 
-    sweep(options)
+    with compiling_told():
+        sweep(options)
 
 
 def _condition(options: argparse.Namespace) -> None:
@@ -127,26 +131,34 @@ def _condition(options: argparse.Namespace) -> None:
 
 def _identify(options: argparse.Namespace) -> None:
     from .commands.identify import identify
+    from .compile import compiling_told
 
-    identify(options)
+    with compiling_told():
+        identify(options)
 
 
 def _validate(options: argparse.Namespace) -> None:
     from .commands.validate import validate
+    from .compile import compiling_told
 
-    validate(options)
+    with compiling_told():
+        validate(options)
 
 
 def _advise(options: argparse.Namespace) -> None:
     from .commands.advise import advise
+    from .compile import compiling_told
 
-    advise(options)
+    with compiling_told():
+        advise(options)
 
 
 def _campaign(options: argparse.Namespace) -> None:
     from .commands.campaign import campaign
+    from .compile import compiling_told
 
-    campaign(options)
+    with compiling_told():
+        campaign(options)
 
 
 def _bench(options: argparse.Namespace) -> None:

@@ -37,6 +37,9 @@ def simulate(command: Parser) -> None:
 def channels(command: Parser) -> None:
     command.add_argument("recording", metavar="FILE", help="recording of any kind and any names")
     _add_mapping(command)
+    command.add_argument(
+        "--flip", metavar="CHANNEL", **SEVERAL, help="channels whose signs are turned over"
+    )
     command.add_argument("-o", "--output", metavar="FILE", help="the mapping as JSON")
 
 
@@ -129,7 +132,7 @@ def advise(command: Parser) -> None:
     command.add_argument(
         "--planned", metavar="NAME", **SEVERAL, help="manoeuvres that will be driven in any case"
     )
-    _add_mapping(command)
+    _add_mappings(command)
     _add_noise(command, "noise of the recordings and, without any, of the sensors")
     command.add_argument("--json", metavar="FILE", help="the advice as JSON")
 
@@ -137,7 +140,7 @@ def advise(command: Parser) -> None:
 def _add_identification(command: Parser) -> None:
     """Recordings, a car, and what is identified how."""
     command.add_argument("runs", metavar="RUN", nargs="+", help="recording")
-    _add_mapping(command)
+    _add_mappings(command)
     _add_vehicle(command)
     command.add_argument("--free", metavar="NAME", **SEVERAL, help="identify these alone")
     command.add_argument("--fixed", metavar="NAME", **SEVERAL, help="identify all but these")
@@ -285,6 +288,15 @@ def _add_noise(command: Parser, what: str) -> None:
 def _add_mapping(command: Parser) -> None:
     command.add_argument(
         "--mapping", metavar="FILE", help="which columns are which channels; see ridetune channels"
+    )
+
+
+def _add_mappings(command: Parser) -> None:
+    command.add_argument(
+        "--mapping",
+        metavar="FILE|RUN=FILE",
+        **SEVERAL,
+        help="which columns are which channels, of all runs or of one; see ridetune channels",
     )
 
 

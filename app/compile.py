@@ -7,8 +7,11 @@ each, which the service would feel.
 
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
+
+FIRST_CALL = "Compiling the kernels for this machine; later starts take a second."
 
 
 def _free() -> None:
@@ -62,6 +65,26 @@ def load_all() -> None:
     """Load every part, or compile it here if it is not in the cache."""
     for part in PARTS.values():
         part()
+
+
+@contextmanager
+def compiling_told() -> Iterator[None]:
+    """Within, the first kernel that is compiled, not read from disk, is told on standard error."""
+    from numba.core import event
+
+    class Teller(event.Listener):
+        told = False
+
+        def on_start(self, event: object) -> None:
+            if not self.told:
+                self.told = True
+                print(FIRST_CALL, file=sys.stderr, flush=True)
+
+        def on_end(self, event: object) -> None:
+            pass
+
+    with event.install_listener("numba:compile", Teller()):
+        yield
 
 
 def is_compiled() -> bool:

@@ -56,23 +56,28 @@ def _condition(services: Services, sid: str, mid: str, body: ConditioningRequest
 
 def _shown(services: Services, sid: str, kept: Measurement) -> dict[str, Any]:
     from ..engine.conditioning.chain import steps_to_json
+    from ..engine.conditioning.kinds import steps_to_add
     from ..engine.conditioning.suggestion import suggest
+    from ..engine.known_band import output_highpass
     from ..engine.step_record import step_record_to_json
     from ..engine.vehicle_file import vehicle_from_json
 
     in_force = kept.conditioning or {"steps": [], "vehicle": None}
     vehicle = vehicle_from_json(services.store.session(sid).vehicle)
-    found = suggest(services.recordings.raw(kept), vehicle)
-    record = services.recordings.run(kept).conditioning
+    raw = services.recordings.raw(kept)
+    found = suggest(raw, vehicle)
+    run = services.recordings.run(kept)
     return {
         "steps": in_force["steps"],
         "vehicle": in_force["vehicle"],
-        "record": [step_record_to_json(one) for one in record],
+        "record": [step_record_to_json(one) for one in run.conditioning],
+        "output_highpass_hz": output_highpass(run),
         "suggestion": {
             "steps": steps_to_json(found.steps),
             "reasons": list(found.reasons),
             "lacks": list(found.lacks),
             "output_highpass_hz": found.output_highpass_hz,
         },
+        "kinds": steps_to_add(raw),
         "measurement": measurement_to_json(services.store, sid, kept),
     }

@@ -17,6 +17,7 @@ class StepRecord:
     numbers : what it found or used, SI, by name
     band_hz : between which frequencies its channels hold what is true, None for no end
     sentences : the same for a person
+    warnings : what is doubtful in what it made
     """
 
     step: Mapping[str, Any]
@@ -24,6 +25,7 @@ class StepRecord:
     numbers: Mapping[str, float] = field(default_factory=dict)
     band_hz: tuple[float | None, float | None] = (None, None)
     sentences: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 def step_record_to_json(record: StepRecord) -> dict[str, Any]:
@@ -38,6 +40,7 @@ def step_record_to_json(record: StepRecord) -> dict[str, Any]:
             if end is not None
         },
         "sentences": list(record.sentences),
+        "warnings": list(record.warnings),
     }
 
 
@@ -55,6 +58,7 @@ def step_records_from_json(data: Any, source: str) -> tuple[StepRecord, ...]:
             {name: float(value) for name, value in one["numbers"].items()},
             (one["band_hz"].get("low"), one["band_hz"].get("high")),
             tuple(one["sentences"]),
+            tuple(one.get("warnings", ())),
         )
         for one in data
     )
@@ -71,11 +75,13 @@ def _is_record(one: Any) -> bool:
             and all(map(_number, value.values()))
         ),
         "sentences": _texts,
+        "warnings": _texts,
     }
     return (
         isinstance(one, Mapping)
-        and one.keys() == wanted.keys()
-        and all(fits(one[name]) for name, fits in wanted.items())
+        # Notes of an earlier version have none.
+        and one.keys() | {"warnings"} == wanted.keys()
+        and all(wanted[name](value) for name, value in one.items())
     )
 
 

@@ -12,7 +12,7 @@ const SAMPLES = 1500;
 const EXCLUSIVE = { seconds: "reference", reference: "seconds" };
 
 let host = null;
-/** What is on show: row, raw (names of the channels recorded), suggestion, record, steps, applied (those in force), vehicle (of those), wrong (place of the step that was refused), channel, chosen (by hand). */
+/** What is on show: row, raw (names of the channels recorded), suggestion, kinds (a step of each, in the order in which they belong), record, above (Hz, what to compare the run above), steps, applied (those in force), vehicle (of those), wrong (place of the step that was refused), channel, chosen (by hand). */
 let at = null;
 let plot = null;
 const parts = {};
@@ -44,9 +44,9 @@ export function shown() {
 }
 
 /** What the service knows of the recording. */
-function took({ steps, record, suggestion, measurement, vehicle }) {
+function took({ steps, record, output_highpass_hz: above, suggestion, kinds, measurement, vehicle }) {
   // A file may bring records of its own; those of the steps come behind them.
-  Object.assign(at, { row: measurement, applied: steps, suggestion, vehicle, wrong: null,
+  Object.assign(at, { row: measurement, applied: steps, above, suggestion, kinds, vehicle, wrong: null,
     record: steps.length ? record.slice(-steps.length) : [] });
   if (steps.length) at.steps = structuredClone(steps);
   const names = present();
@@ -154,13 +154,14 @@ const button = (text, label, usable, run) => h("button", { type: "button", class
   "aria-label": label, title: label, disabled: !usable, on: { click: run } }, text);
 
 /** What a step did. */
-function recordOf({ channels, numbers, band_hz: { low, high }, sentences }) {
+function recordOf({ channels, numbers, band_hz: { low, high }, sentences, warnings }) {
   const hertz = (value) => units.plain(value, 3);
   const band = low && high ? `True from ${hertz(low)} to ${hertz(high)} Hz.` : low ? `True above ${hertz(low)} Hz.`
     : high ? `True below ${hertz(high)} Hz.` : "";
   const found = Object.entries(numbers);
   return h("div", { className: "record" },
     sentences.map((text) => h("p", {}, text)),
+    warnings.length ? h("ul", { className: "warnings" }, warnings.map((text) => h("li", {}, text))) : null,
     band ? h("p", { className: "strong" }, band) : null,
     channels.length || found.length
       ? h("details", {}, h("summary", { className: "soft" }, "numbers"),
@@ -177,11 +178,17 @@ const known = () => [...new Set([...at.raw, ...present(),
 
 function adding() {
   const choice = h("select", { id: "step-kind", "aria-label": "Kind of step to add" },
-    Object.entries(KINDS).map(([kind, { label, what }]) => h("option", { value: kind, title: what }, `${label}: ${what}`)));
+    at.kinds.map(({ kind }) => h("option", { value: kind, title: KINDS[kind].what }, `${KINDS[kind].label}: ${KINDS[kind].what}`)));
   return h("div", { className: "row-tools adding" }, choice,
-    h("button", { type: "button", id: "add-step",
-      on: { click: () => change([...at.steps, { kind: choice.value, ...structuredClone(KINDS[choice.value].fresh ?? {}) }]) } },
-    "Add step"));
+    h("button", { type: "button", id: "add-step", on: { click: () => add(choice.value) } }, "Add step"));
+}
+
+/** A step more, before those that belong behind it. */
+function add(kind) {
+  const rank = (one) => at.kinds.findIndex((other) => other.kind === one);
+  const behind = at.steps.findIndex((one) => rank(one.kind) > rank(kind));
+  const place = behind < 0 ? at.steps.length : behind;
+  change([...at.steps.slice(0, place), structuredClone(at.kinds[rank(kind)]), ...at.steps.slice(place)]);
 }
 
 function move(place, by) {
@@ -257,8 +264,8 @@ const outcome = () => [lacking(), highpass(),
 
 /** What is slower than a band is not known; an identification should not compare it. */
 function highpass() {
-  const wanted = at.suggestion.output_highpass_hz;
-  if (!wanted || !isApplied() || !at.record.some(({ band_hz: { low } }) => low)) return null;
+  const wanted = at.above;
+  if (!wanted || !isApplied()) return null;
   const { output_highpass_hz: now } = get("rimsSettings");
   const hertz = `${units.plain(wanted, 3)} Hz`;
   if (now !== null && now >= wanted) {

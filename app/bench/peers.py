@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ...engine.extras import how_to_install
 from ...engine.simulation.simulate import FREE_STEP
 from .cases import Case
 from .modes import STAGES, relative_error, the_car, the_demand
@@ -17,8 +18,8 @@ from .workbench import Workbench
 
 Array = NDArray[np.float64]
 
-INSTALL = {"mujoco": "mujoco>=3.3,<4", "exudyn": "exudyn>=1.13,<2"}
-"""What `pip install` makes a peer of, by the name it is imported by."""
+EXTRAS = {"mujoco": "bench", "exudyn": "detailed"}
+"""The extra that brings a peer, by the name it is imported by."""
 
 
 def optional(module: str, what: str, measure: Case) -> Case:
@@ -26,7 +27,7 @@ def optional(module: str, what: str, measure: Case) -> Case:
 
     def case(bench: Workbench) -> Row:
         if find_spec(module) is None:
-            return Row(f'{what}: not installed; pip install "{INSTALL[module]}"')
+            return Row(f"{what}: not installed; {how_to_install(EXTRAS[module])}")
         return measure(bench)
 
     return case

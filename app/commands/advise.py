@@ -20,8 +20,9 @@ from ...engine.manoeuvre import Manoeuvre
 from ...engine.parameters import parameter
 from .inputs import (
     find_manoeuvre,
-    find_mapping,
+    find_mappings,
     find_vehicle,
+    mapping_files,
     read_noise,
     read_runs,
     recording_files,
@@ -31,7 +32,8 @@ from .output import print_table, require_place, significant, write_file
 
 def advise(options: Namespace) -> None:
     """Rank the candidates, print the report, write the advice."""
-    inputs = (options.vehicle, options.noise, options.mapping, *recording_files(options.runs))
+    read = (*mapping_files(options.mapping), *recording_files(options.runs))
+    inputs = (options.vehicle, options.noise, *read)
     require_place(options.json, (*inputs, *options.candidates, *options.planned))
     candidates = _candidates(options)
     planned = tuple(map(_key, options.planned))
@@ -61,7 +63,7 @@ def _key(name: str) -> str:
 
 def _problem(options: Namespace, noise: Mapping[str, float]) -> Problem:
     """The problem of the runs at fitted values: those of a fit's file, else fitted now."""
-    runs = read_runs(options.runs, (), find_mapping(options.mapping), noise=noise)
+    runs = read_runs(options.runs, (), find_mappings(options.mapping, options.runs), noise=noise)
     data = read_json(Path(options.vehicle), VehicleError) if _is_json(options.vehicle) else None
     if not is_fit(data):
         problem = Problem.build(find_vehicle(options.vehicle), runs)

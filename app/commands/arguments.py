@@ -1,5 +1,6 @@
 """What is written in arguments: NAME=VALUE, NAME=LOW:HIGH, NAME=LOW:HIGH:COUNT,
-NAME=VALUE~DEVIATION, CHANNEL.QUANTITY=VALUE, [RUN=]BEGIN:END, a frequency, a whole number.
+NAME=VALUE~DEVIATION, CHANNEL.QUANTITY=VALUE, [RUN=]BEGIN:END, [RUN=]FILE, a frequency, a whole
+number.
 """
 
 import math
@@ -172,6 +173,28 @@ def braking(marks: Iterable[str], paths: Sequence[str]) -> dict[int, tuple[Inter
         place = place_of(name, paths, f"--braking {mark}") if name else 0
         marked.setdefault(place, []).append(mark)
     return {place: _intervals(of_run, paths[place]) for place, of_run in marked.items()}
+
+
+def mappings(given: Iterable[str], paths: Sequence[str]) -> list[str | None]:
+    """The mapping's file of each run in `paths`, out of RUN=FILE and, for all others, FILE."""
+    of_run: dict[int, str] = {}
+    others: str | None = None
+    for text in given:
+        argument = f"--mapping {text}"
+        name, equals, file = text.rpartition("=")
+        if equals and not (name and file):
+            raise ArgumentError(f"{argument} names no run or no file; write FILE or RUN=FILE.")
+        place = place_of(name, paths, argument) if equals else None
+        if others is not None if place is None else place in of_run:
+            raise ArgumentError(
+                f"{argument} is a second mapping of {name or 'the same runs'}; give one, as FILE "
+                "for all runs or as RUN=FILE."
+            )
+        if place is None:
+            others = file
+        else:
+            of_run[place] = file
+    return [of_run.get(place, others) for place in range(len(paths))]
 
 
 def place_of(name: str, paths: Sequence[str], argument: str) -> int:

@@ -2,12 +2,16 @@
 
 import json
 from argparse import Namespace
+from collections.abc import Sequence
+from dataclasses import replace
+from difflib import get_close_matches
 
 from ...engine.errors import MeasurementError
 from ...engine.mapping.mapping import ChannelMapping, mapping_to_json
 from ...engine.mapping.reading import read_recording, survey_file
 from ...engine.mapping.signs import check_signs
 from ...engine.mapping.survey import Survey
+from .arguments import ArgumentError
 from .inputs import find_mapping, recording_files
 from .output import print_table, print_warnings, require_place, write_file
 
@@ -18,10 +22,12 @@ MOST_ROWS = 200
 def channels(options: Namespace) -> None:
     """Print what each column is taken for and why, and write the mapping."""
     require_place(options.output, (options.mapping, *recording_files([options.recording])))
-    mapping = find_mapping(options.mapping)
+    given = find_mapping(options.mapping)
     found, warnings = survey_file(options.recording), []
-    if mapping is None:
+    _require_mapped(options.flip, found.guess.mapping if given is None else given)
+    if given is None:
         warnings += found.warnings
+        found = replace(found, guess=found.guess.flipped(options.flip))
         mapping = found.guess.mapping
         try:
             if any(one.channel != "time" for one in mapping.columns):
@@ -29,6 +35,7 @@ def channels(options: Namespace) -> None:
         except MeasurementError as error:
             warnings.append(str(error))
     else:
+        mapping = given.flipped(options.flip)
         warnings += _findings(options.recording, mapping)
         found = found.with_templates({"--mapping": mapping})
     _print(found)
@@ -37,6 +44,21 @@ def channels(options: Namespace) -> None:
         text = json.dumps(mapping_to_json(found.guess.mapping), indent=2, ensure_ascii=False)
         write_file(options.output, text + "\n")
         print(f"Wrote {options.output}: look through it, then add --mapping {options.output}.")
+
+
+def _require_mapped(flips: Sequence[str], mapping: ChannelMapping) -> None:
+    """Refuse to turn over the sign of what has none."""
+    known = [one.channel for one in mapping.columns if one.channel != "time"]
+    for place, name in enumerate(flips):
+        argument = f"--flip {name}"
+        if name in flips[:place]:
+            raise ArgumentError(f"{argument} is given twice; give it once.")
+        if name not in known:
+            near = get_close_matches(name, known, n=1) or known
+            raise ArgumentError(
+                f"{argument}: no column is taken for a channel {name} that has a sign; "
+                + (f"name {' or '.join(near)}." if near else "map it first.")
+            )
 
 
 def _findings(path: str, mapping: ChannelMapping) -> list[str]:

@@ -10,6 +10,7 @@ from ...engine.conditioning.chain import condition as after
 from ...engine.conditioning.chain import read_steps, steps_to_json
 from ...engine.conditioning.suggestion import Suggestion, suggest
 from ...engine.errors import MeasurementError
+from ...engine.known_band import output_highpass
 from ...engine.measurement import missing_for_identification, run_to_csv
 from ...engine.run_notes import notes_beside, notes_of, read_notes
 from .arguments import ArgumentError
@@ -27,13 +28,15 @@ def condition(options: Namespace) -> None:
     suggestion = None if options.steps else suggest(run, vehicle)
     if options.suggest and suggestion:
         print(json.dumps(steps_to_json(suggestion.steps), indent=1))
-        for sentence in (*suggestion.reasons, *_further(suggestion)):
+        above = suggestion.output_highpass_hz
+        for sentence in (*suggestion.reasons, *_lacking(suggestion), *_compared_above(above)):
             print(sentence, file=sys.stderr)
         return
     steps = read_steps(Path(options.steps)) if suggestion is None else suggestion.steps
     done = after(run, steps, vehicle)
     for record in done.conditioning[len(run.conditioning) :]:
         print(f"{record.step['kind']}: {' '.join(record.sentences)}")
+        print_warnings(record.warnings)
     print(f"{len(steps)} steps, {done.time.size} samples over {done.duration:.4g} s.")
     _print_use(done, suggestion)
     if options.output:
@@ -42,22 +45,25 @@ def condition(options: Namespace) -> None:
         print(f"Wrote {options.output}, and what was done beside it.")
 
 
-def _further(suggestion: Suggestion) -> list[str]:
-    """What the steps leave to be done."""
-    told = [f"Still lacking, {sentence}" for sentence in suggestion.lacks]
-    if suggestion.output_highpass_hz is not None:
-        told.append(f"Compare the run with --output-highpass {suggestion.output_highpass_hz:g}.")
-    return told
+def _lacking(suggestion: Suggestion) -> list[str]:
+    return [f"Still lacking, {sentence}" for sentence in suggestion.lacks]
+
+
+def _compared_above(hertz: float | None) -> list[str]:
+    return [] if hertz is None else [f"Compare the run with --output-highpass {hertz:g}."]
 
 
 def _print_use(done: Run, suggestion: Suggestion | None) -> None:
     """Say whether a fit can use the run, and how."""
     missing = missing_for_identification(done)
     if suggestion is not None:
-        for sentence in _further(suggestion):
-            print(sentence)
+        lacking = _lacking(suggestion)
     elif missing:
-        print(f"Still lacking for an identification: {', '.join(missing)}.")
+        lacking = [f"Still lacking for an identification: {', '.join(missing)}."]
+    else:
+        lacking = []
+    for sentence in (*lacking, *_compared_above(output_highpass(done))):
+        print(sentence)
     print_warnings(done.warnings)
 
 

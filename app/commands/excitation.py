@@ -53,7 +53,8 @@ def files_read(options: Namespace) -> tuple[str | Path | None, ...]:
 def excitation(options: Namespace, mode: Mode, vehicle: Vehicle) -> Excitation:
     """What the options let the car go through."""
     if mode == "rims":
-        [run] = read_runs([options.rims], options.braking or (), find_mapping(options.mapping))
+        under = [find_mapping(options.mapping)]
+        [run] = read_runs([options.rims], options.braking or (), under)
         motion = recorded_motion(run, rims_settings(options))
         return RimsExcitation(motion, options.traction or "exact")
     how: dict[str, Any] = {"lift_off": options.lift_off, "step": options.step}

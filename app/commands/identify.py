@@ -17,7 +17,14 @@ from ...engine.vehicle import Vehicle
 from ..time_left import SearchClock
 from .arguments import bounds, loss, priors, rims_settings, sensors, whole
 from .arguments import starts as start_values
-from .inputs import find_mapping, find_vehicle, read_noise, read_runs, recording_files
+from .inputs import (
+    find_mappings,
+    find_vehicle,
+    mapping_files,
+    read_noise,
+    read_runs,
+    recording_files,
+)
 from .output import (
     print_fit_percent,
     print_table,
@@ -31,12 +38,12 @@ from .watch import hours
 
 def identify(options: Namespace) -> None:
     """Fit the free parameters to all runs at once, print the report, write the fit."""
-    inputs = (options.vehicle, options.noise, options.mapping, *recording_files(options.runs))
-    require_place(options.output, inputs)
+    read = (*mapping_files(options.mapping), *recording_files(options.runs))
+    require_place(options.output, (options.vehicle, options.noise, *read))
     noise = read_noise(options.noise)
     vehicle = find_vehicle(options.vehicle)
-    mapping = find_mapping(options.mapping)
-    runs = read_runs(options.runs, options.braking or (), mapping, noise=noise)
+    under = find_mappings(options.mapping, options.runs)
+    runs = read_runs(options.runs, options.braking or (), under, noise=noise)
     problem = asked(options, vehicle, runs)
     profiled = [parameter(name).name for name in options.profile or ()]
     require_free(problem, profiled)

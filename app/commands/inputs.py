@@ -20,7 +20,7 @@ from ...engine.mapping.reading import read_recording
 from ...engine.run_notes import notes_beside, read_notes
 from ...engine.vehicle import Vehicle
 from ...engine.vehicle_file import read_vehicle, reference_vehicles
-from .arguments import braking
+from .arguments import braking, mappings
 
 Known = TypeVar("Known")
 
@@ -71,6 +71,18 @@ def find_mapping(path: str | None) -> ChannelMapping | None:
     return None if path is None else read_mapping(path)
 
 
+def find_mappings(given: Iterable[str], paths: Sequence[str]) -> list[ChannelMapping | None]:
+    """The mapping of each run in `paths`, as FILE and RUN=FILE tell."""
+    files = mappings(given, paths)
+    known = {file: read_mapping(file) for file in dict.fromkeys(files) if file is not None}
+    return [None if file is None else known[file] for file in files]
+
+
+def mapping_files(given: Iterable[str]) -> list[str]:
+    """All that `find_mappings` reads."""
+    return [text.rpartition("=")[2] for text in given]
+
+
 def read_one(
     path: str, mapping: ChannelMapping | None, *, noise: Mapping[str, float] | None = None
 ) -> Run:
@@ -87,15 +99,17 @@ def read_one(
 def read_runs(
     paths: Sequence[str],
     marks: Iterable[str],
-    mapping: ChannelMapping | None = None,
+    under: Sequence[ChannelMapping | None],
     *,
     noise: Mapping[str, float] | None = None,
 ) -> list[Run]:
-    """The recordings, with their braking where a mark tells it; `mapping`, `noise` as of
-    `read_recording`.
+    """The recordings, each under its mapping, with their braking where a mark tells it; `noise` as
+    of `read_recording`.
     """
     marked = braking(marks, paths)
-    runs = [read_one(path, mapping, noise=noise) for path in paths]
+    runs = [
+        read_one(path, mapping, noise=noise) for path, mapping in zip(paths, under, strict=True)
+    ]
     return [
         replace(run, braking=marked[place]) if place in marked else run
         for place, run in enumerate(runs)

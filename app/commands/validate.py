@@ -30,8 +30,9 @@ from .arguments import ArgumentError, place_of, rims_settings
 from .identify import asked, fitted, print_fit
 from .inputs import (
     find_manoeuvre,
-    find_mapping,
+    find_mappings,
     find_vehicle,
+    mapping_files,
     read_noise,
     read_runs,
     recording_files,
@@ -48,8 +49,8 @@ def validate(options: Namespace) -> None:
     _require_places(options, paths)
     geometry = _geometry(options.geometry)
     vehicle = find_vehicle(options.vehicle)
-    mapping, noise = find_mapping(options.mapping), read_noise(options.noise)
-    runs = read_runs(paths, options.braking or (), mapping, noise=noise)
+    under, noise = find_mappings(options.mapping, paths), read_noise(options.noise)
+    runs = read_runs(paths, options.braking or (), under, noise=noise)
     cases = _cases(runs, len(options.runs), _manoeuvres(options.manoeuvre, paths))
     check_cases(cases)
     fit = fitted(options, asked(options, vehicle, runs[: len(options.runs)]))
@@ -79,7 +80,8 @@ def _require_places(options: Namespace, paths: Sequence[str]) -> None:
     """Refuse places that cannot be written before the work is done."""
     beside = [manoeuvre_beside(Path(path)) for path in paths]
     inputs = (
-        *(options.vehicle, options.noise, options.mapping, options.geometry),
+        *(options.vehicle, options.noise, options.geometry),
+        *mapping_files(options.mapping),
         *recording_files(paths),
         *beside,
         *(text.partition("=")[2] for text in options.manoeuvre),

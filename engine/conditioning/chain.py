@@ -26,14 +26,16 @@ Step = (
     | Despike
     | Resample
     | Scale
-    | Rest
     | Delay
+    | Rest
     | Speed
     | Angles
     | Gravity
     | Displacement
     | RimFromTravel
 )
+"""In the order in which they belong."""
+
 Steps = tuple[Step, ...]
 
 MOST_STEPS = 100
@@ -96,6 +98,7 @@ def _after(run: Run, step: Step, done: Done) -> Run:
         done.numbers,
         done.band_hz,
         done.sentences,
+        done.warnings,
     )
     return replace(
         run,

@@ -125,8 +125,7 @@ class Delay:
             )
         reference = history(run, self.reference)
         for name, one in ((self.channel, values), (self.reference, reference)):
-            moves = np.std(in_band(run.time, one, self.band_hz))
-            if moves <= 1e-9 * max(float(np.max(np.abs(one))), 1e-12):
+            if not moves(run.time, one, self.band_hz):
                 raise ConditioningError(
                     f"{name} does not move between {self.band_hz[0]:g} and {self.band_hz[1]:g} Hz, "
                     "so that no delay shows; choose another band or reference."
@@ -148,6 +147,12 @@ class Delay:
             f"{lag.correlation:.3f})"
         )
         return lag, told
+
+
+def moves(time: Array, values: Array, band: tuple[float, float]) -> bool:
+    """Whether a channel holds anything but rounding in a band, Hz."""
+    size = max(float(np.max(np.abs(values))), 1e-12)
+    return bool(np.std(in_band(time, values, band)) > 1e-9 * size)
 
 
 def find_lag(

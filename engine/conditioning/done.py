@@ -30,6 +30,7 @@ class Done:
     numbers: Mapping[str, float] = field(default_factory=dict)
     band_hz: Band = (None, None)
     sentences: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
     noise: Mapping[str, float] = field(default_factory=dict)
     settled: tuple[str, ...] = ()
 
@@ -43,6 +44,11 @@ def history(run: Run, name: str) -> Array:
             f"{name} has gaps (not a number) from {first:.4g} s on; fill or cut them before."
         )
     return values
+
+
+def history_or(run: Run, name: str, otherwise: float) -> Array:
+    """A channel (samples,) without gaps, or a constant in its place."""
+    return history(run, name) if name in run else np.full(len(run.time), otherwise)
 
 
 def recorded(run: Run, name: str) -> Array:

@@ -31,11 +31,13 @@ from .done import (
     Array,
     Done,
     history,
+    history_or,
     require,
     require_band,
     require_resolved,
     require_sampled,
 )
+from .lateness import find_lateness
 
 TARGETS = {
     "chassis.a_z": "chassis.z",
@@ -164,6 +166,7 @@ class Angles:
         steep, told = self._by_gravity(run)
         found = turned + slow_part(run.time, steep - turned, low)
         drift = float(np.polyfit(run.time, turned - steep, 1)[0])
+        late = find_lateness(run, low) if self.angle == "pitch" else None
         return Done(
             {target: found},
             numbers={"gyro_bias_rad_s": drift},
@@ -171,16 +174,20 @@ class Angles:
                 f"{target} is {rate} integrated above {low:g} Hz, and by gravity below; {told}",
                 f"The gyro's bias was {math.degrees(drift):.3g} deg/s.",
             ),
+            warnings=() if late is None else (late.warning,),
         )
 
     def _by_gravity(self, run: Run) -> tuple[Array, str]:
         """The angle by the accelerometer, and what was taken for granted."""
         if self.angle == "roll":
-            across, up = history(run, "chassis.body_a_y"), _or(run, "chassis.body_a_z", GRAVITY)
+            across, up = (
+                history(run, "chassis.body_a_y"),
+                history_or(run, "chassis.body_a_z", GRAVITY),
+            )
             return np.arctan2(across, up), "no acceleration sideways is taken for granted."
-        along, up = history(run, "chassis.body_a_x"), _or(run, "chassis.body_a_z", GRAVITY)
-        up = up / np.cos(_or(run, "chassis.roll", 0.0))
-        a_x = _or(run, "chassis.a_x", 0.0)
+        along, up = history(run, "chassis.body_a_x"), history_or(run, "chassis.body_a_z", GRAVITY)
+        up = up / np.cos(history_or(run, "chassis.roll", 0.0))
+        a_x = history_or(run, "chassis.a_x", 0.0)
         gravity = np.sqrt(np.maximum(along**2 + up**2 - a_x**2, (0.1 * GRAVITY) ** 2))
         if "chassis.a_x" in run:
             told = "the car's own acceleration is taken off by chassis.a_x."
@@ -205,7 +212,7 @@ class Gravity:
 
     def apply(self, run: Run, vehicle: Vehicle | None) -> Done:
         """The run with the accelerations."""
-        pitch, roll = history(run, "chassis.pitch"), _or(run, "chassis.roll", 0.0)
+        pitch, roll = history(run, "chassis.pitch"), history_or(run, "chassis.roll", 0.0)
         sp, cp, sr, cr = np.sin(pitch), np.cos(pitch), np.sin(roll), np.cos(roll)
         swing = self._swing(run, pitch, roll)
         along = history(run, "chassis.body_a_x") - swing[0]
@@ -292,8 +299,3 @@ class Speed:
             require(run, names)
         rolling = [name for name in there if name.split(".")[1] not in driven] or there
         return np.mean([history(run, name) for name in rolling], axis=0), rolling
-
-
-def _or(run: Run, name: str, otherwise: float) -> Array:
-    """A channel, or a constant in its place."""
-    return history(run, name) if name in run else np.full(len(run.time), otherwise)

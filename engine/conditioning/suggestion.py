@@ -6,12 +6,16 @@ from typing import Literal
 import numpy as np
 
 from ..channels import INPUT_CHANNELS, OUTPUT_CHANNELS, Run, channel
+from ..errors import ConditioningError
 from ..filters import PAD_PERIODS, is_uniform
 from ..frames import CORNERS, Corner
+from ..known_band import TIMES_LOWEST
 from ..spikes import spike_samples
 from ..vehicle import Vehicle
 from .calibration import Rest, speeds, standstill
-from .chain import Step
+from .chain import Step, condition
+from .delay import Delay
+from .lateness import find_lateness
 from .motion import TARGETS, Angles, Displacement, Gravity, Speed
 from .rims import RimFromTravel
 from .sampling import Despike, Fill, Resample
@@ -21,9 +25,6 @@ FASTEST, RATE = 400.0, 200.0
 
 LOWEST, HIGHEST, CROSSOVER = 0.3, 50.0, 0.2
 """Band of displacements and crossover of angles, Hz, where the record allows them."""
-
-TIMES_LOWEST = 2.0
-"""What is in a band counts from so many times its lowest frequency on: 1/65 is missing there."""
 
 ANGLES: tuple[tuple[Literal["pitch", "roll"], str], ...] = (
     ("pitch", "chassis.body_a_x"),
@@ -55,6 +56,7 @@ def suggest(run: Run, vehicle: Vehicle | None = None) -> Suggestion:
     """
     chain = _Chain(run, vehicle)
     chain.mend()
+    chain.bring_in_time()
     chain.count_from_rest()
     chain.drive()
     chain.turn()
@@ -65,7 +67,7 @@ def suggest(run: Run, vehicle: Vehicle | None = None) -> Suggestion:
         tuple(chain.steps),
         tuple(chain.reasons),
         chain.lacks(),
-        TIMES_LOWEST * chain.low if chain.banded else None,
+        TIMES_LOWEST * max(chain.lows) if chain.lows else None,
     )
 
 
@@ -77,10 +79,8 @@ class _Chain:
         self.has = set(run.columns)
         self.steps: list[Step] = []
         self.reasons: list[str] = []
-        self.banded = False
-        self.standing = standstill(run)
-        longest = float(np.ceil(100.0 * PAD_PERIODS / run.duration) / 100.0)
-        self.low, self.crossover = max(LOWEST, longest), max(CROSSOVER, longest)
+        self.lows: list[float] = []
+        self._measure(run)
         self.rate = (len(run.time) - 1) / run.duration
 
     def add(self, step: Step, reason: str, *makes: str) -> None:
@@ -88,6 +88,12 @@ class _Chain:
         self.steps.append(step)
         self.reasons.append(f"{step.kind}: {reason}")
         self.has.update(makes)
+
+    def _measure(self, run: Run) -> None:
+        """Where the car stands, and from which frequencies on the record is long enough."""
+        self.standing = standstill(run)
+        longest = float(np.ceil(100.0 * PAD_PERIODS / run.duration) / 100.0)
+        self.low, self.crossover = max(LOWEST, longest), max(CROSSOVER, longest)
 
     def mend(self) -> None:
         """Gaps, spikes and sampling."""
@@ -105,6 +111,23 @@ class _Chain:
         elif not is_uniform(run.time):
             even = float(max(1, round(self.rate)))
             self.add(Resample(even), "the samples are not evenly spaced.")
+
+    def bring_in_time(self) -> None:
+        """A speed or an acceleration that is clearly late against the accelerometer."""
+        gyro = "chassis.pitch" not in self.has and "chassis.pitch_rate" in self.has
+        by_speed = "chassis.a_x" not in self.has
+        if not gyro or (by_speed and "chassis.v_x" not in self.has):
+            return
+        try:
+            speed = [Speed(acceleration=True)] if by_speed else []
+            late = find_lateness(condition(self.run, [*self.steps, *speed]), self.crossover)
+        except ConditioningError:
+            # The step that cannot be done will say so itself.
+            return
+        if late is not None:
+            step = Delay(late.channel, seconds=round(late.lag.seconds, 3))
+            self.add(step, f"without it {late.seen}.")
+            self._measure(condition(self.run, self.steps))
 
     def count_from_rest(self) -> None:
         """Bias of raw sensors."""
@@ -150,7 +173,7 @@ class _Chain:
             else:
                 step = Angles(angle, False, self.crossover)
                 self.add(step, f"{rate} gives {target} above {self.crossover:g} Hz.", target)
-                self.banded = True
+                self.lows.append(self.crossover)
 
     def upright(self) -> None:
         """Inertial accelerations from body-fixed ones."""
@@ -189,7 +212,7 @@ class _Chain:
         high = min(HIGHEST, 0.2 * self.rate)
         reason = f"{', '.join(names)} give {', '.join(targets)} in a band."
         self.add(Displacement(names, (self.low, high)), reason, *targets)
-        self.banded = True
+        self.lows.append(self.low)
 
     def lacks(self) -> tuple[str, ...]:
         """What is still missing, with the remedy."""

@@ -10,18 +10,18 @@ from threading import Lock
 from typing import Any
 
 from ..errors import SimulationError
+from ..extras import how_to_install
 
 _IMPORTING = Lock()
 """Standard output is one for all threads: two that turn it aside would not both turn it back."""
-
-INSTALL = 'pip install "ridetune[detailed]"'
 
 
 def missing_exudyn() -> str:
     """What to do where Exudyn is missing, a sentence; empty where it is installed."""
     if find_spec("exudyn") is not None:
         return ""
-    return f"The detailed car is solved by Exudyn; install it: {INSTALL}"
+    how = how_to_install("detailed")
+    return f"The detailed car is solved by Exudyn, which is not installed; {how}."
 
 
 def require_exudyn() -> tuple[Any, Any]:

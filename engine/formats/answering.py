@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import RideError, UnmappedError
+from ..extras import how_to_install
 from .envelope import envelope
 from .kinds import kind_of
 from .listing import SPENT
@@ -13,6 +14,9 @@ from .readers import read_as
 from .table import Array, Table
 
 Answer = tuple[dict[str, Any], Sequence[Array]]
+
+INSTALL = how_to_install("formats")
+"""Found before the process is confined and sees no files."""
 
 
 class Answering:
@@ -44,9 +48,7 @@ class Answering:
         except MemoryError:
             return self._out_of_memory()
         except ImportError as error:
-            return self._error(
-                f"{error.name or 'a package'} cannot be loaded; install ridetune[formats] again"
-            )
+            return self._error(f"{error.name or 'a package'} cannot be loaded; {INSTALL}")
         except Exception as error:  # the readers raise whatever a spoilt file drives them to
             if "allocate" in str(error).lower():
                 return self._out_of_memory()

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import MeasurementError
+from ..extras import how_to_install
 from .kinds import CSV, ERG_ZIP
 from .table import Table
 
@@ -54,9 +55,8 @@ def missing_package(kind: str) -> str:
     package = READERS[kind].package
     if not package or find_spec(package) is not None:
         return ""
-    return (
-        f"{kind} needs {package}, which is not installed; install ridetune[formats], or take CSV."
-    )
+    how = how_to_install("formats")
+    return f"{kind} needs {package}, which is not installed; {how}, or take CSV."
 
 
 def require_package(kind: str) -> None:

@@ -4,7 +4,7 @@ scores are greatest together and no channel is given twice.
 A score is how well the name fits (`patterns`) times what unit and numbers leave of it (`sizes`).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -74,6 +74,14 @@ class Guess:
     chosen: Mapping[int, Candidate]
     candidates: tuple[tuple[Candidate, ...], ...]
     warnings: tuple[str, ...]
+
+    def flipped(self, channels: Collection[str]) -> "Guess":
+        """With the signs of some channels turned over."""
+        chosen = {
+            index: replace(one, sign=-one.sign) if one.channel in channels else one
+            for index, one in self.chosen.items()
+        }
+        return replace(self, mapping=self.mapping.flipped(channels), chosen=chosen)
 
 
 def named_like_channels(columns: Sequence[Column]) -> list[int]:

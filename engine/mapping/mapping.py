@@ -8,7 +8,7 @@ It is kept as JSON and used again for every file whose columns have the same nam
      "longest_gap": 0.1, "step": null}
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -105,6 +105,16 @@ class ChannelMapping:
     def sure_signs(self) -> frozenset[str]:
         """Channels whose signs somebody has confirmed."""
         return frozenset(one.channel for one in self.columns if one.sign_sure)
+
+    def flipped(self, channels: Collection[str]) -> "ChannelMapping":
+        """With the signs of some channels turned over, which nobody has confirmed yet."""
+        return replace(
+            self,
+            columns=tuple(
+                replace(one, sign=-one.sign, sign_sure=False) if one.channel in channels else one
+                for one in self.columns
+            ),
+        )
 
     def fits(self, columns: "Places") -> bool:
         """Whether a file has every column, each another one."""

@@ -22,9 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PPoly
 
-from ..channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
+from ..channels import INPUT_CHANNELS, WHEEL_CHANNELS, Run
 from ..errors import MeasurementError
 from ..filters import PAD_PERIODS, is_uniform, resolved, smoothed, too_coarse
+from ..known_band import lowest_known, output_highpass
 from .braking import slow_acceleration
 from .initial_state import measured_state
 from .recording_checks import Finding, check_recording, stands
@@ -120,6 +121,7 @@ def recorded_motion(run: Run, settings: RimsSettings) -> RecordedMotion:
         doubts=(
             *_sampling_warnings(run, settings),
             *_compared_below_band(run, settings),
+            *_doubtful_conditioning(run),
             *unknown_start,
         ),
     )
@@ -211,17 +213,23 @@ def _sampling_warnings(run: Run, settings: RimsSettings) -> list[str]:
     ]
 
 
+def _doubtful_conditioning(run: Run) -> list[str]:
+    """What the steps that made the channels say of them."""
+    return [
+        f"Run {run.name}, conditioning, {record.step['kind']}: {warning}"
+        for record in run.conditioning
+        for warning in record.warnings
+    ]
+
+
 def _compared_below_band(run: Run, settings: RimsSettings) -> list[str]:
     """A warning where conditioning left nothing of a channel at frequencies that are compared."""
-    made = {name: record for record in run.conditioning for name in record.channels}
-    lows = {
-        name: made[name].band_hz[0] for name in (*WHEEL_CHANNELS, *OUTPUT_CHANNELS) if name in made
-    }
-    banded = {name: low for name, low in lows.items() if low is not None}
+    banded = lowest_known(run)
     if not banded or (settings.output_highpass_hz or 0.0) >= max(banded.values()):
         return []
     low = max(banded.values())
     return [
         f"Run {run.name} has {', '.join(banded)} from {low:g} Hz up alone, and z, pitch and roll "
-        f"are compared below as well; set output_highpass_hz to {2.0 * low:g}, at least to {low:g}."
+        "are compared below as well; set output_highpass_hz to "
+        f"{output_highpass(run):g}, at least to {low:g}."
     ]

@@ -20,6 +20,7 @@ from typing import Any, BinaryIO, Literal, Protocol
 import numpy as np
 
 from ..errors import SweepError
+from ..extras import how_to_install
 from ..simulation.excitation import Excitation
 from ..vehicle import Vehicle
 from ..vehicle_file import vehicle_to_json
@@ -56,7 +57,7 @@ def require_package(form: Form) -> None:
     """Raise SweepError where a form needs a package that is not installed."""
     if form != "csv" and find_spec("pyarrow") is None:
         raise SweepError(
-            f"{form.capitalize()} needs pyarrow, which is not installed; install ridetune[sweep],"
+            f"{form.capitalize()} needs pyarrow, which is not installed; {how_to_install('sweep')},"
             " or take CSV."
         )
 

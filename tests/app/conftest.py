@@ -2,6 +2,7 @@
 
 import csv
 import io
+import json
 import logging
 import time
 from collections.abc import Iterator, Mapping
@@ -12,9 +13,12 @@ import pytest
 from dask import config
 from distributed import LocalCluster
 from fastapi.testclient import TestClient
+from ridetune.app.cli import main
 from ridetune.app.cluster import CONFIGURATION
 from ridetune.app.main import create_app
 from ridetune.app.settings import Limits, Settings
+
+from .command_line import SHORT
 
 ADDRESS = "http://127.0.0.1:8000"
 SAMPLES = Path(__file__).parents[2] / "sample_runs"
@@ -121,6 +125,23 @@ def small_limits(tmp_path) -> Settings:
         identified_samples=20_000,
     )
     return Settings(data=tmp_path / "small", limits=limits)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture(scope="session")
+def driven(tmp_path_factory):
+    """The path of a short noise-free run of the paper's car, with every channel."""
+    folder = tmp_path_factory.mktemp("driven")
+    (folder / "short.json").write_text(json.dumps(SHORT))
+    path = folder / "driven.csv"
+    command = ["simulate", "--vehicle", "paper", "--manoeuvre", str(folder / "short.json")]
+    assert main([*command, "-o", str(path)]) == 0
+    return path
 
 
 def short_recording(samples: int = 101) -> bytes:

@@ -14,19 +14,13 @@ from ridetune.engine.measurement import read_run
 from ridetune.engine.simulation.excitation import FreeExcitation
 from ridetune.engine.vehicle_file import reference_vehicles, vehicle_to_json
 
+from .command_line import refused
 from .conftest import SAMPLES, Visitor, open_client
-from .test_cli import refused
 from .test_frames import read_binary
 
 PAPER = vehicle_to_json(reference_vehicles()["paper"])
 RUN = SAMPLES / "twin/manoeuvre_1.csv"
 BUMP = FreeExcitation(reference_manoeuvres()["bump"].lasting(2.0))
-
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
 
 
 def test_a_fits_file_gives_bands_beside_the_run(folder, capsys):

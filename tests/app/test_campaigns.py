@@ -13,6 +13,7 @@ from ridetune.engine.campaign import CAMPAIGN, Campaign, chosen, roughened
 from ridetune.engine.campaign_run import drive
 from ridetune.engine.detailed.car_file import reference_car
 from ridetune.engine.detailed.plant import DetailedPlant
+from ridetune.engine.extras import how_to_install
 from ridetune.engine.manoeuvre import manoeuvre_from_json, manoeuvre_to_json, reference_manoeuvres
 from ridetune.engine.measurement import run_to_csv
 from ridetune.engine.plant import ConceptPlant
@@ -339,7 +340,7 @@ def test_the_plants_are_listed(client):
 def test_a_car_whose_solver_is_not_installed_is_listed_and_refused(visitor, monkeypatch):
     monkeypatch.setattr("ridetune.engine.detailed.exudyn_module.find_spec", lambda name: None)
     _, detailed = visitor.client.get("/api/plants").json()
-    assert detailed["missing"].endswith('install it: pip install "ridetune[detailed]"')
+    assert detailed["missing"].endswith(f"not installed; {how_to_install('detailed')}.")
     refused = visitor.post("/campaigns", json={"plant": "detailed", "manoeuvres": ["bump"]})
     assert (refused.status_code, refused.json()["detail"]) == (422, detailed["missing"])
     assert visitor.get("/campaigns").json() == []

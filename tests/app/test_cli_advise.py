@@ -6,16 +6,10 @@ from pathlib import Path
 import pytest
 from ridetune.app.cli import main
 
-from .test_cli import refused
+from .command_line import refused
 
 SAMPLES = Path(__file__).parents[2] / "sample_runs"
 TWIN = [str(SAMPLES / f"twin/manoeuvre_{number}.csv") for number in (1, 2)]
-
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
 
 
 def test_a_plan_is_made_before_there_is_any_run(folder, capsys):

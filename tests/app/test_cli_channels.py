@@ -8,10 +8,10 @@ import pytest
 from ridetune.app.cli import main
 from ridetune.engine.mapping.mapping import read_mapping
 from ridetune.engine.mapping.reading import read_recording
-from ridetune.engine.measurement import read_run
+from ridetune.engine.measurement import read_run, write_run
 
+from .command_line import refused
 from .conftest import SAMPLES
-from .test_cli import refused
 
 NATIVE = SAMPLES / "twin/manoeuvre_2.csv"
 TITLES = {
@@ -56,10 +56,7 @@ def test_the_columns_are_shown_with_what_they_are_taken_for_and_why(foreign, cap
 
 def test_a_mapping_makes_a_foreign_recording_one_of_ours(foreign, capsys):
     """Once pitch is turned back, every number is that of the sample, to the digits written."""
-    main(["channels", "foreign.csv", "-o", "mapping.json"])
-    mapping = json.loads((foreign.parent / "mapping.json").read_text())
-    next(one for one in mapping["columns"] if one["channel"] == "chassis.pitch")["sign"] = -1
-    (foreign.parent / "mapping.json").write_text(json.dumps(mapping))
+    main(["channels", "foreign.csv", "--flip", "chassis.pitch", "-o", "mapping.json"])
     found, native = read_recording(foreign, read_mapping("mapping.json")), read_run(NATIVE)
     for name in TITLES:
         np.testing.assert_allclose(found[name], native[name], rtol=1e-10, atol=1e-12)
@@ -77,6 +74,47 @@ def test_a_mapping_makes_a_foreign_recording_one_of_ours(foreign, capsys):
     assert len(shown[0]) == 2
 
 
+def test_the_signs_of_named_channels_are_turned_over(foreign, capsys):
+    """Of the guess and of a mapping that is there already, whose confirmed sign is none then."""
+
+    def signs():
+        return {one.channel: one.sign for one in read_mapping("mapping.json").columns}
+
+    main(["channels", "foreign.csv", "-o", "mapping.json"])
+    guessed = signs()
+    flip = ["--flip", "chassis.pitch", "chassis.z", "-o", "mapping.json"]
+    capsys.readouterr()
+    assert main(["channels", "foreign.csv", *flip]) == 0
+    printed = capsys.readouterr().out
+    assert re.search(r"^Nickwinkel .* chassis.pitch +deg +-1 ", printed, re.M)
+    assert "chassis.pitch runs against" not in printed
+    turned = {name: -1 if name in flip else 1 for name in guessed}
+    assert signs() == {name: sign * turned[name] for name, sign in guessed.items()}
+    known = json.loads((foreign.parent / "mapping.json").read_text())
+    for one in known["columns"]:
+        one["sign_sure"] = True
+    (foreign.parent / "known.json").write_text(json.dumps(known))
+    command = ["channels", "foreign.csv", "--mapping", "known.json"]
+    assert main([*command, "--flip", "chassis.z", "--flip", "chassis.pitch", *flip[-2:]]) == 0
+    assert signs() == guessed
+    unsure = {one.channel for one in read_mapping("mapping.json").columns if not one.sign_sure}
+    assert unsure == {"chassis.z", "chassis.pitch"}
+
+
+@pytest.mark.parametrize(
+    ("flip", "sentence"),
+    [
+        (["chassis.pich"], "--flip chassis.pich: no column is taken for a channel chassis.pich"),
+        (["time"], "--flip time: no column is taken for a channel time that has a sign; name "),
+        (["chassis.z", "chassis.z"], "--flip chassis.z is given twice"),
+    ],
+)
+def test_a_sign_that_cannot_be_turned_over_is_refused(foreign, capsys, flip, sentence):
+    said = refused(capsys, "channels", "foreign.csv", "--flip", *flip, "-o", "mapping.json")
+    assert sentence in said
+    assert not (foreign.parent / "mapping.json").exists()
+
+
 @pytest.mark.parametrize(
     "command",
     [
@@ -91,6 +129,64 @@ def test_other_names_without_a_mapping_are_refused_with_the_way(foreign, capsys,
     assert "foreign.csv: no column is called time" in said
     assert "run `ridetune channels foreign.csv -o mapping.json`" in said
     assert said.endswith("and add --mapping mapping.json.")
+
+
+def test_a_run_has_a_mapping_of_its_own(foreign, capsys):
+    """The halves of a recording, the second with other names. Oracle: the fit to both halves
+    by our names, whose numbers have eleven digits.
+    """
+    main(["channels", "foreign.csv", "--flip", "chassis.pitch", "-o", "first.json"])
+    title, *rows = foreign.read_text().splitlines()
+    foreign.write_text("\n".join([title, *rows[:2000]]))
+    (foreign.parent / "other.csv").write_text("\n".join(["a;b;c;d;e;f;g;h", *rows[2000:]]))
+    mapping = json.loads((foreign.parent / "first.json").read_text())
+    for one, name in zip(mapping["columns"], "abcdefgh", strict=True):
+        one["column"] = name
+    (foreign.parent / "second.json").write_text(json.dumps(mapping))
+    for name, under in (("foreign", "first"), ("other", "second")):
+        run = read_recording(f"{name}.csv", read_mapping(f"{under}.json"))
+        write_run(run, f"our_{name}.csv")
+
+    def fit(*runs):
+        free = ["--free", "K_F", "C_F", "-o", "fit.json"]
+        assert main(["identify", *runs, "--vehicle", "paper", *free]) == 0
+        found = json.loads((foreign.parent / "fit.json").read_text())
+        return [one["value"] for one in found["parameters"]]
+
+    ours = fit("our_foreign.csv", "our_other.csv")
+    runs = ["foreign.csv", "other.csv"]
+    for told in (
+        ["first.json", "other.csv=second.json"],
+        ["other.csv=second.json", "foreign.csv=first.json"],
+    ):
+        np.testing.assert_allclose(fit(*runs, "--mapping", *told), ours, rtol=1e-6)
+    validate = ["validate", runs[0], "--vehicle", "paper", "--free", "K_F", "-o", "report.html"]
+    held = ["--hold-out", runs[1], "--mapping", "first.json", "other.csv=second.json"]
+    assert main([*validate, *held]) == 0
+    advise = ["advise", *runs, "--vehicle", "fit.json", "--candidates", "heave"]
+    assert main([*advise, "--mapping", "first.json", "other.csv=second.json"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("told", "sentence"),
+    [
+        (
+            ["lap.csv=m.json"],
+            "--mapping lap.csv=m.json: there is no run lap.csv; there are foreign",
+        ),
+        (["=m.json"], "--mapping =m.json names no run or no file; write FILE or RUN=FILE."),
+        (["m.json", "n.json"], "--mapping n.json is a second mapping of the same runs; give one"),
+        (
+            ["foreign.csv=m.json", "foreign.csv=n.json"],
+            "--mapping foreign.csv=n.json is a second mapping of foreign.csv; give one",
+        ),
+    ],
+)
+@pytest.mark.parametrize("command", [["identify"], ["validate", "-o", "r.html"], ["advise"]])
+def test_a_mapping_that_is_no_run_s_is_refused(foreign, capsys, command, told, sentence):
+    name, *more = command
+    asked = [name, "foreign.csv", *more, "--vehicle", "paper", "--mapping", *told]
+    assert sentence in refused(capsys, *asked)
 
 
 def test_what_makes_no_sense_with_a_mapping_is_refused(foreign, capsys):

@@ -41,6 +41,7 @@ def test_the_suggested_steps_can_be_edited_and_done(folder, capsys):
     assert main([*command, "-o", "done.csv"]) == 0
     printed = capsys.readouterr().out
     assert "chassis.z from 0.3 to 40 Hz; an error of 1 mg at 0.3 Hz is 2.8 mm." in printed
+    assert "Compare the run with --output-highpass 0.6." in printed
     done = read_run("done.csv")
     assert missing_for_identification(done) == ()
     assert [record.step for record in done.conditioning] == steps
@@ -49,6 +50,36 @@ def test_the_suggested_steps_can_be_edited_and_done(folder, capsys):
     # What it wrote itself it writes over.
     assert main([*command, "-o", "done.csv"]) == 0
     assert read_run("done.csv").conditioning == done.conditioning
+
+
+@pytest.mark.parametrize(("low", "told"), [(0.45, "0.9"), (None, None)])
+def test_the_high_pass_that_the_steps_call_for_is_told(folder, capsys, low, told):
+    """Oracle: twice the lowest frequency of what is made; nothing without a band."""
+    steps = [{"kind": "rest"}, {"kind": "scale", "channel": "chassis.body_a_z"}]
+    if low:
+        steps.append({"kind": "displacement", "channels": ["wheel.fl.a_z"], "band_hz": [low, 40]})
+    (folder / "steps.json").write_text(json.dumps(steps))
+    assert main(["condition", "raw.csv", "--steps", "steps.json"]) == 0
+    printed = capsys.readouterr().out
+    assert re.findall(r"--output-highpass ([\d.]+)\.$", printed, re.MULTILINE) == (
+        [told] if told else []
+    )
+
+
+def test_what_a_step_finds_doubtful_is_told_and_kept_beside_the_recording(folder, capsys):
+    """Oracle: the speed is made 0.35 s late."""
+    write_run(recorded(CAR, drive(CAR, sample_step=0.005), seed=3, delay=0.35), "late.csv")
+    steps = [
+        {"kind": "rest"},
+        {"kind": "speed", "acceleration": True},
+        {"kind": "angles", "angle": "pitch"},
+    ]
+    (folder / "steps.json").write_text(json.dumps(steps))
+    assert main(["condition", "late.csv", "--steps", "steps.json", "-o", "done.csv"]) == 0
+    [line] = [one for one in capsys.readouterr().out.splitlines() if "seems" in one]
+    assert re.match(r"Warning: chassis.pitch changes by .* chassis.v_x seems 0\.3[45]\d ±", line)
+    [kept] = read_run("done.csv").conditioning[-1].warnings
+    assert line == f"Warning: {kept}"
 
 
 def test_a_fit_says_how_its_inputs_came_about(folder, capsys):

@@ -21,16 +21,10 @@ from ridetune.engine.sweeps.designs import LatinHypercube, Sobol
 from ridetune.engine.sweeps.sweep import Progress
 from ridetune.engine.vehicle_file import read_vehicle, reference_vehicles
 
-from .test_cli import PROGRAM, refused
+from .command_line import PROGRAM, refused
 
 SHORT = "sweep --vehicle paper --manoeuvre bump --duration 1.5"
 BOX = "--range K_F=1e4:3e4 chassis.mass=900:1300"
-
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
 
 
 def run(text):

@@ -11,19 +11,13 @@ from numpy.testing import assert_allclose
 from ridetune.app.cli import main
 from ridetune.engine.measurement import read_run, write_run
 
-from .test_cli import refused
+from .command_line import refused
 
 SAMPLES = Path(__file__).parents[2] / "sample_runs"
 TWIN = [str(SAMPLES / f"twin/manoeuvre_{number}.csv") for number in (1, 2)]
 COMMAND = f"validate {TWIN[0]} --hold-out {TWIN[1]} --vehicle paper"
 # Springs alone are found within seconds; all else is the twin's own.
 QUICK = "--free K_F K_R --start K_F=30000"
-
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
 
 
 class Elements(HTMLParser):

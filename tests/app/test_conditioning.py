@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from ridetune.app.recordings import as_stated, stated
 from ridetune.engine.conditioning.chain import condition, steps_from_json
+from ridetune.engine.conditioning.kinds import steps_to_add
 from ridetune.engine.measurement import parse_run, read_run, run_to_csv
 from ridetune.engine.run_notes import notes_of
 from ridetune.engine.step_record import step_record_to_json
@@ -39,6 +40,7 @@ def test_a_raw_recording_becomes_one_to_identify_from(visitor, kept, raw):
     assert kept["usable_for_identification"] is False
     shown = visitor.get(address(kept)).json()
     assert (shown["steps"], shown["record"], shown["vehicle"]) == ([], [], None)
+    assert shown["kinds"] == steps_to_add(raw)
     suggestion = shown["suggestion"]
     assert suggestion["lacks"] == []
     assert suggestion["output_highpass_hz"] == pytest.approx(0.6)
@@ -50,6 +52,8 @@ def test_a_raw_recording_becomes_one_to_identify_from(visitor, kept, raw):
     assert [one["step"] for one in done["record"]] == suggestion["steps"]
     assert all(one["sentences"] for one in done["record"])
     assert done["suggestion"] == suggestion
+    assert shown["output_highpass_hz"] is None
+    assert done["output_highpass_hz"] == suggestion["output_highpass_hz"]
     measurement = done["measurement"]
     assert measurement["usable_for_identification"] is True
     assert measurement["conditioning"] == suggestion["steps"]

@@ -4,6 +4,7 @@ import json
 import signal
 
 import pytest
+from ridetune.engine.extras import how_to_install
 
 from .conftest import AWAY, Service
 
@@ -191,7 +192,8 @@ def test_a_campaign_is_followed_on_after_the_service_has_been_away(visit, tmp_pa
 def test_a_car_that_cannot_drive_here_is_shown_with_the_reason(visit, service):
     """As the service's list has it where the solver is not installed."""
     visitor = visit()
-    why = 'The detailed car is solved by Exudyn; install it: pip install "ridetune[detailed]"'
+    how = how_to_install("detailed")
+    why = f"The detailed car is solved by Exudyn, which is not installed; {how}."
 
     def lacking(route):
         concept, detailed = route.fetch().json()

@@ -1,6 +1,7 @@
 """From a file of another house to a run that can be fitted, as a visitor of the page does it."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -224,6 +225,35 @@ def test_a_raw_recording_is_conditioned_until_it_can_be_fitted(visitor):
     visitor.click("#as-recorded")
     visitor.until("!ridetune.state('measurements').at(-1).usable_for_identification")
     assert newest(visitor)["conditioning"] is None
+    visitor.settled()
+
+
+def test_a_late_speed_is_told_and_its_delay_found_by_a_step_that_is_put_where_it_belongs(visitor):
+    """Oracle: the speed is made 0.35 s late; what the step finds is some ms short."""
+    car, page = paper_vehicle(), visitor.page
+    raw = recorded(car, drive(car, sample_step=0.005), seed=2, delay=0.35)
+    visitor.click("#tab-measurements")
+    add(visitor, "late.csv", run_to_csv(raw).encode())
+    open_next(visitor, ".conditioning")
+    steps = page.locator(".step")
+    first = steps.first
+    assert "Why: without it chassis.pitch changes by" in first.inner_text()
+    page.get_by_label("Remove: Take off a delay, step 1").click()
+    visitor.click("#apply-steps")
+    told = page.locator(".step .warnings li")
+    visitor.wait(lambda: told.count() == 1, "the pitch is doubtful")
+    assert re.search(r"chassis.v_x seems 0\.3[45]\d ± 0.00\d s late", told.inner_text())
+    before = steps.count()
+    page.select_option("#step-kind", "delay")
+    visitor.click("#add-step")
+    assert steps.count() == before + 1
+    assert "Take off a delay" in first.inner_text()
+    band = [page.get_by_label(f"Take off a delay, step 1, in the band, {k}") for k in (1, 2)]
+    assert [one.input_value() for one in band] == ["0.2", "2"]
+    visitor.click("#apply-steps")
+    visitor.wait(lambda: "taken off" in first.inner_text(), "the delay is found")
+    assert re.search(r"chassis.v_x was 3[45]\d\.\d+ ms late ± [\d.]+ ms", first.inner_text())
+    assert told.count() == 0
     visitor.settled()
 
 

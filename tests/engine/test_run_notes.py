@@ -108,6 +108,7 @@ def test_what_conditioning_did_goes_into_notes_and_back():
         {"offset.chassis.z": -1.25e-3, "begin_s": 0.0},
         (0.3, None),
         ('Took "off" a \\ and é.', "Another."),
+        ("It drifts.",),
     )
     run = Run("r", [0.0, 1.0], {"chassis.z": [0.0, 1.0]}, {"chassis.z": 1e-4}, (), 'a "b"')
     notes = parse_notes(notes_of(replace(run, conditioning=(record,) * 2)).encode(), "r.toml")

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
@@ -80,7 +82,12 @@ def test_numbers_beyond_all_bounds_stop_it():
 
 def test_a_record_goes_to_json_and_back():
     [record] = condition(RUN, [Cut(1.0, 2.0)]).conditioning
-    assert step_records_from_json([step_record_to_json(record)], "s") == (record,)
+    record = replace(record, warnings=("It drifts.",))
+    kept = step_record_to_json(record)
+    assert step_records_from_json([kept], "s") == (record,)
+    # Notes of before there were warnings.
+    del kept["warnings"]
+    assert step_records_from_json([kept], "s") == (replace(record, warnings=()),)
 
 
 @pytest.mark.parametrize("data", [3, [3], [{}], [{"step": {}, "channels": []}]])

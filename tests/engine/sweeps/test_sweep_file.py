@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 import subprocess
 import sys
 
@@ -12,6 +13,7 @@ import pytest
 from numpy.testing import assert_array_equal
 from pyarrow import feather, parquet
 from ridetune.engine.errors import SweepError
+from ridetune.engine.extras import how_to_install
 from ridetune.engine.manoeuvre import manoeuvre_from_json, reference_manoeuvres
 from ridetune.engine.simulation.excitation import FreeExcitation
 from ridetune.engine.sweeps import sweep_file
@@ -143,9 +145,8 @@ def test_the_end_of_a_name_tells_the_form():
 def test_without_pyarrow_csv_is_written_and_the_others_say_what_to_install(monkeypatch):
     monkeypatch.setattr(sweep_file, "find_spec", lambda name: None)
     assert form_of("cars.csv") == "csv"
-    with pytest.raises(
-        SweepError, match=r"Parquet needs pyarrow, .* install ridetune\[sweep\], or"
-    ):
+    how = re.escape(how_to_install("sweep"))
+    with pytest.raises(SweepError, match=f"Parquet needs pyarrow, .*; {how}, or"):
         form_of("cars.parquet")
 
 
