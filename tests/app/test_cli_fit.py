@@ -11,13 +11,13 @@ from ridetune.app.commands.identify import print_fit
     ("interval", "said"),
     [
         ((10.0, 14.0), "2.0"),
-        ((12.34, math.inf), "from 12.3"),
-        ((-math.inf, 40.0), "up to 40.0"),
+        ((12.34, math.inf), "from 12.340"),
+        ((-math.inf, 40.0), "up to 40.000"),
         ((-math.inf, math.inf), "unbounded"),
     ],
 )
 def test_of_an_open_interval_the_known_end_is_printed(capsys, interval, said):
-    """In the words of the page."""
+    """In the words of the page, as exact as the value beside it."""
     one = SimpleNamespace(
         title="d_F", value=12.0, unit="m", determined="no", confidence_interval=interval
     )
