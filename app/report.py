@@ -43,7 +43,7 @@ _IMPORT = re.compile(r'((?:from|import) )"\./(\w+\.js)"')
 
 
 def report(document: Mapping[str, Any]) -> str:
-    """The report of a validation's document (see engine.validation_file) as HTML text."""
+    """The report of a validation's document (engine.validation.validation_file) as HTML."""
     static = package_folder("static")
     data = {"validation": document, "tables": _tables()}
     modules = _modules(static, ENTRY)

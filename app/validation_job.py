@@ -43,7 +43,8 @@ def check_and_fill(
     limits: Limits,
 ) -> dict[str, Any]:
     """Everything that the job needs, checked."""
-    from ..engine.validation import check_cases, geometry_from_json
+    from ..engine.validation.cases import check_cases
+    from ..engine.validation.geometry import geometry_from_json
 
     fit = done(fitted)
     held = [store.measurement(session, one) for one in request.hold_out]
@@ -100,7 +101,7 @@ def _runs(spec: Mapping[str, Any], session: str, store: Store, recordings: Recor
 def _cases(spec: Mapping[str, Any], runs: list[Any]) -> list[Any]:
     """The engine's cases."""
     from ..engine.manoeuvre import manoeuvre_from_json
-    from ..engine.validation import Case
+    from ..engine.validation.cases import Case
 
     driven = {one: manoeuvre_from_json(data) for one, data in spec["manoeuvres"].items()}
     return [
@@ -114,8 +115,9 @@ def validate_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -
     from ..engine.identification.sensing import corrected
     from ..engine.identification.sensor_model import readings_in
     from ..engine.simulation.rims_settings import RimsSettings
-    from ..engine.validation import geometry_from_json, validate
-    from ..engine.validation_file import validation_to_json
+    from ..engine.validation.geometry import geometry_from_json
+    from ..engine.validation.validate import validate
+    from ..engine.validation.validation_file import validation_to_json
     from .report import made
 
     fit, geometry = payload["fit"], payload["geometry"]

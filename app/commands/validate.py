@@ -16,15 +16,11 @@ from ...engine.identification.sensor_model import readings_in
 from ...engine.json_text import read_json
 from ...engine.manoeuvre import Manoeuvre, read_manoeuvre
 from ...engine.run_notes import manoeuvre_beside
-from ...engine.validation import (
-    Case,
-    Geometry,
-    Validation,
-    check_cases,
-    geometry_from_json,
-)
-from ...engine.validation import validate as predict
-from ...engine.validation_file import validation_to_json
+from ...engine.validation.cases import Case, check_cases
+from ...engine.validation.geometry import Geometry, geometry_from_json
+from ...engine.validation.validate import Validation
+from ...engine.validation.validate import validate as predict
+from ...engine.validation.validation_file import validation_to_json
 from ..report import made, report
 from .arguments import ArgumentError, place_of, rims_settings
 from .identify import asked, fitted, print_fit

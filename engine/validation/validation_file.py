@@ -11,13 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .channels import OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
-from .frames import CORNERS
-from .identification.fit_file import plain
-from .manoeuvre import manoeuvre_to_json
-from .roads.iso8608 import CLASSES, REFERENCE_FREQUENCY
-from .roads.road_spectrum import RoadSpectrum
-from .validation import Geometry, Prediction, Score, ValidatedRun, Validation
+from ..channels import OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
+from ..frames import CORNERS
+from ..identification.fit_file import plain
+from ..manoeuvre import manoeuvre_to_json
+from ..roads.iso8608 import CLASSES, REFERENCE_FREQUENCY
+from ..roads.road_spectrum import RoadSpectrum
+from .geometry import Geometry
+from .prediction import Prediction, Score
+from .validate import ValidatedRun, Validation
 
 MOST_SAMPLES = 4001
 
