@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -18,7 +19,7 @@ from ...engine.manoeuvre import Manoeuvre, read_manoeuvre
 from ...engine.run_notes import manoeuvre_beside
 from ...engine.validation.cases import Case, check_cases
 from ...engine.validation.geometry import Geometry, geometry_from_json
-from ...engine.validation.validate import Validation
+from ...engine.validation.validate import ValidatedRun, Validation
 from ...engine.validation.validate import validate as predict
 from ...engine.validation.validation_file import validation_to_json
 from ..report import made, report
@@ -143,9 +144,35 @@ def _print(validation: Validation) -> None:
             what = f"{run.name} ({'fitted' if run.role == 'fit' else 'held out'})"
             rows.append([what, DRIVEN_BY[one.mode], MODELS[one.model], *scores])
     print_table(rows, right=range(3, 3 + len(names)))
+    _print_squats(validation.runs)
     print_warnings(
         f"{run.name}, {DRIVEN_BY[one.mode]}, {MODELS[one.model]}: {one.failure}"
         for run in validation.runs
         for one in run.predictions
         if one.failure
     )
+
+
+def _print_squats(runs: Sequence[ValidatedRun]) -> None:
+    """Print the step of the pitch, measured and predicted, of the runs that have one."""
+    squatting = [run for run in runs if run.squat is not None]
+    kinds = list(
+        dict.fromkeys((one.mode, one.model) for run in squatting for one in run.predictions)
+    )
+    if not squatting:
+        return
+    rows = [
+        [
+            "squat, deg of pitch",
+            "measured",
+            *(f"{MODELS[model]}, {DRIVEN_BY[mode]}" for mode, model in kinds),
+        ]
+    ]
+    for run in squatting:
+        predicted = {(one.mode, one.model): one.squat for one in run.predictions}
+        steps = [run.squat, *(predicted.get(kind) for kind in kinds)]
+        rows.append(
+            [run.name, *("-" if step is None else f"{math.degrees(step):.3f}" for step in steps)]
+        )
+    print()
+    print_table(rows, right=range(1, 2 + len(kinds)))

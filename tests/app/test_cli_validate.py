@@ -6,6 +6,7 @@ import re
 from html.parser import HTMLParser
 from pathlib import Path
 
+import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from ridetune.app.cli import main
@@ -47,6 +48,11 @@ def test_a_held_out_run_is_predicted_over_its_road(folder, capsys):
     assert re.search(r"manoeuvre_2\.csv \(held out\) +road \+ torque +8-DOF +96\.", printed.out)
     document = json.loads((folder / "r.json").read_text())
     fitted, held = document["runs"]
+    [heads] = re.findall(r"squat, deg of pitch.*", printed.out)
+    assert heads.split("  ")[-1].strip() == "7-DOF, road + torque"
+    [steps] = re.findall(r"^manoeuvre_2\.csv +(-[-. \d]+)$", printed.out, re.MULTILINE)
+    told = [held["squat"]["step"], *(one["squat"] for one in held["predictions"])]
+    assert_allclose([float(step) for step in steps.split()], np.degrees(told), atol=5e-4)
     assert held["manoeuvre"]["seed"] == 2
     for run in (fitted, held):
         assert [one["mode"] for one in run["predictions"]] == ["rims", "rims", "road", "road"]
