@@ -70,7 +70,19 @@ def check_and_fill(
         geometry_from_json(request.geometry)
     check_budget(kept, fit["settings"]["step"], limits)
     check_cases(_cases(spec, _runs(spec, session, store, recordings)))
-    return {**spec, "recorded": [{"name": one.name, "sha256": one.sha256} for one in kept]}
+    data = set(map(_data, kept))
+    left_out = [
+        one.name
+        for one in store.measurements(session)
+        if _data(one) not in data and one.summary["usable_for_identification"]
+    ]
+    recorded = [{"name": one.name, "sha256": one.sha256} for one in kept]
+    return {**spec, "recorded": recorded, "left_out": left_out}
+
+
+def _data(kept: Measurement) -> str:
+    """What stands for a recording's data, however they are written."""
+    return kept.summary.get("data_sha256") or kept.sha256
 
 
 def _driven(request: ValidationRequest, kept: Sequence[Measurement]) -> dict[str, Any]:
@@ -138,11 +150,11 @@ def validate_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -
         found,
         fit,
         None if geometry is None else geometry_from_json(geometry),
-        made(payload["recorded"]),
+        made(payload["recorded"], payload.get("left_out", ())),
     )
     summary = [
         {
-            **{name: run[name] for name in ("name", "role", "squat")},
+            **{name: run[name] for name in ("name", "role", "findings", "squat")},
             "predictions": [
                 {name: value for name, value in one.items() if name != "values"}
                 for one in run["predictions"]

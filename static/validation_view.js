@@ -34,7 +34,7 @@ const WELL = { yes: "well", weakly: "weakly", no: "not" };
 /** Sections of a validation's document; `width` of the figures in px, null to follow their box. */
 export function sections(document, width = null) {
   return [
-    section("summary", "How well the car predicts", scores(document), squats(document)),
+    section("summary", "How well the car predicts", scores(document), leftOut(document), squats(document)),
     section("parameters", "Identified parameters", h("p", {}, document.fit.outcome),
       estimates(document)),
     warnings(document),
@@ -54,6 +54,9 @@ const described = (run) => `${units.number(run.duration, 4)} s, ${run.samples} s
 const shown = (name, value, digits = 3) =>
   units.number(value === null ? NaN : value * units.channel(name).display_factor, digits);
 
+/** Why a run says little of the car; documents of earlier versions do not tell. */
+const findingsOf = ({ findings = [] }) => findings;
+
 /** Fit percent, rms error and rating of every prediction. */
 function scores({ runs }) {
   const heads = OUTPUTS.map((name) => units.channel(name));
@@ -69,6 +72,8 @@ function scores({ runs }) {
     runs.map((run) => h("tbody", {},
       h("tr", {}, h("th", { colSpan: 2 + 3 * OUTPUTS.length, scope: "rowgroup" },
         `${run.name}, ${ROLES[run.role]}`)),
+      findingsOf(run).map((text) => h("tr", {},
+        h("td", { colSpan: 2 + 3 * OUTPUTS.length, className: "said doubt" }, worded(text)))),
       run.predictions.map((one) => scoreRow(one))))));
 }
 
@@ -86,6 +91,10 @@ function scoreRow(one) {
     });
   return h("tr", { className: one.model === "7dof" ? "soft" : "" },
     h("td", {}, MODES[one.mode]), h("td", {}, MODELS[one.model]), cells);
+}
+
+function leftOut({ made: { left_out: names = [] } }) {
+  return names.length ? h("p", { className: "hint" }, `Neither fitted nor held out: ${names.join(", ")}.`) : null;
 }
 
 /** The step of the pitch while the car accelerates: what the 7-DOF model cannot give on a road. */
@@ -139,9 +148,10 @@ function estimates({ fit, geometry }) {
     }))));
 }
 
+/** What is doubtful, but for what stands beside the scores. */
 function warnings({ fit, runs }) {
-  const said = [...fit.warnings, ...runs.flatMap(({ name, predictions }) =>
-    predictions.flatMap((one) => one.warnings.map((text) =>
+  const said = [...fit.warnings, ...runs.flatMap(({ name, predictions, ...run }) =>
+    predictions.flatMap((one) => one.warnings.filter((text) => !findingsOf(run).includes(text)).map((text) =>
       (text.includes(name) ? text : `${name}: ${text}`))))];
   const texts = [...new Set(said)];
   if (!texts.length) return null;

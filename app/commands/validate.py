@@ -145,6 +145,7 @@ def _print(validation: Validation) -> None:
             rows.append([what, DRIVEN_BY[one.mode], MODELS[one.model], *scores])
     print_table(rows, right=range(3, 3 + len(names)))
     _print_squats(validation.runs)
+    print_warnings(finding for run in validation.runs for finding in run.findings)
     print_warnings(
         f"{run.name}, {DRIVEN_BY[one.mode]}, {MODELS[one.model]}: {one.failure}"
         for run in validation.runs

@@ -11,6 +11,7 @@ from ..errors import ManoeuvreError, ProblemError
 from ..identification.compared_runs import distinct_names, same_data
 from ..manoeuvre import Manoeuvre
 from ..measurement import missing_for_identification
+from ..vehicle import Vehicle
 
 Role = Literal["fit", "hold-out"]
 
@@ -22,6 +23,16 @@ class Case:
     run: Run
     role: Role
     manoeuvre: Manoeuvre | None = None
+
+
+def another_car(run: Run, vehicle: Vehicle) -> list[str]:
+    """A sentence where a run is known to be of another car than the one that predicts it."""
+    if run.vehicle in ("", vehicle.name):
+        return []
+    return [
+        f"Run {run.name} was recorded with another car, {run.vehicle}, than the one that predicts"
+        f" it, {vehicle.name}; leave it out unless they are the same."
+    ]
 
 
 def check_cases(cases: Sequence[Case]) -> list[str]:

@@ -46,6 +46,7 @@ class Prediction:
 
     run : at the recording's times, outputs through the output filter; None where the model failed
     squat : step of the pitch, rad, where the run has one
+    faults : those of the warnings by which the recording is probably wrong
     failure : why there is no run
     """
 
@@ -55,6 +56,7 @@ class Prediction:
     scores: Mapping[str, Score] = field(default_factory=dict)
     squat: float | None = None
     warnings: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
     failure: str = ""
 
 
@@ -93,7 +95,7 @@ def predict(
         if name in measured and name in run
     }
     squat = None if window is None else window.step(run)
-    return Prediction(mode, model, run, scores, squat, found.warnings)
+    return Prediction(mode, model, run, scores, squat, found.warnings, found.faults)
 
 
 def _simulation(

@@ -17,18 +17,24 @@ from ..roads.road_spectrum import RoadSpectrum, road_spectra
 from ..simulation.rims_settings import RimsSettings
 from ..simulation.simulate import Traction
 from ..vehicle import Vehicle
-from .cases import Case, Role, check_cases
+from .cases import Case, Role, another_car, check_cases
 from .prediction import Prediction, as_compared, kinds, predict
 from .squat import SquatWindow, squat_window
 
 
 @dataclass(frozen=True, eq=False)
 class ValidatedRun:
-    """A run beside its predictions; `measured` has its outputs through the output filter."""
+    """A run beside its predictions.
+
+    measured : with its outputs through the output filter
+    findings : why the predictions say little of the car: the recording is of another one, or
+        probably wrong
+    """
 
     name: str
     role: Role
     measured: Run
+    findings: tuple[str, ...]
     manoeuvre: Manoeuvre | None
     predictions: tuple[Prediction, ...]
     window: SquatWindow | None
@@ -82,6 +88,10 @@ def validate(
                 name=name,
                 role=case.role,
                 measured=measured,
+                findings=(
+                    *another_car(case.run, vehicle),
+                    *dict.fromkeys(fault for one in found for fault in one.faults),
+                ),
                 manoeuvre=case.manoeuvre,
                 predictions=tuple(found),
                 window=window,

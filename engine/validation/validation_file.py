@@ -63,6 +63,7 @@ def _run(run: ValidatedRun) -> dict[str, Any]:
     return {
         "name": run.name,
         "role": run.role,
+        "findings": list(run.findings),
         "samples": run.measured.time.size,
         "duration": run.measured.duration,
         "manoeuvre": None if run.manoeuvre is None else manoeuvre_to_json(run.manoeuvre),

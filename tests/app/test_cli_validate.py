@@ -3,6 +3,7 @@
 import hashlib
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -89,6 +90,22 @@ def test_the_manoeuvre_beside_a_recording_is_taken_and_texts_stay_texts(folder):
     assert found["name"] == name
     assert found["manoeuvre"]["name"] == "</script><b>"
     assert {one["mode"] for one in found["predictions"]} == {"rims", "road"}
+
+
+def test_what_makes_a_held_out_run_tell_nothing_is_warned_of(folder, capsys):
+    """Oracle: the channel that was turned over, and the car that the notes name."""
+    run = read_run(TWIN[1])
+    turned = replace(run, channels={**run.channels, "chassis.z": -run["chassis.z"]})
+    write_run(turned, "turned.csv")
+    (folder / "turned.toml").write_text('vehicle = "BMW 320i"')
+    command = f"validate {TWIN[0]} --hold-out turned.csv --vehicle paper {QUICK} -o r.html"
+    assert main(f"{command} --json r.json".split()) == 0
+    printed = capsys.readouterr()
+    warnings = [line for line in printed.out.splitlines() if line.startswith("Warning: ")]
+    findings = json.loads((folder / "r.json").read_text())["runs"][1]["findings"]
+    assert warnings[-2:] == [f"Warning: {one}" for one in findings]
+    assert "another car, BMW 320i" in findings[0]
+    assert "chassis.z of run turned.csv runs against the model" in findings[1]
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from ridetune.engine.errors import Cancelled, ManoeuvreError, ProblemError
 from ridetune.engine.manoeuvre import reference_manoeuvres
 from ridetune.engine.measurement import read_run
 from ridetune.engine.run_notes import DEFAULT_NOISE
+from ridetune.engine.simulation.simulate import simulate_rims
 from ridetune.engine.torque_laws import Deceleration
 from ridetune.engine.validation.cases import Case, check_cases
 from ridetune.engine.validation.geometry import Geometry
@@ -93,6 +94,20 @@ def test_a_recording_sampled_otherwise_is_predicted_at_its_own_times():
     found = validate(PAPER, [replace(case, run=thin)]).runs[0]
     score = prediction(found, "road", "8dof").scores["chassis.z"]
     assert_allclose(score.rms_error, DEFAULT_NOISE["chassis.z"], rtol=0.08)
+
+
+def test_a_turned_channel_and_another_car_are_told_beside_the_run():
+    """Oracle: what was done to the run, and the words of a simulation on its rims."""
+    case = twin(2, "hold-out", known=False)
+    channels = case.run.channels | {"chassis.pitch": -case.run["chassis.pitch"]}
+    turned = replace(case, run=replace(case.run, channels=channels, vehicle="BMW 320i"))
+    right, wrong = validate(PAPER, [twin(1, known=False), turned]).runs
+    assert right.findings == ()
+    other, fault = wrong.findings
+    assert "recorded with another car, BMW 320i, than the one" in other
+    assert simulate_rims(PAPER, turned.run).faults == (fault,)
+    assert "chassis.pitch of run manoeuvre_2.csv runs against the model" in fault
+    assert prediction(wrong, "rims", "8dof").scores["chassis.pitch"].fit_percent < 0.0
 
 
 def test_without_a_manoeuvre_there_are_only_the_rims():
