@@ -21,8 +21,8 @@ from .worker import Report, WithFile
 
 KIND = "validation"
 
-BYTES_A_RUN = 4_000_000
-"""What a run takes in the document, at most: 4001 instants of 40 histories."""
+BYTES_A_RUN = 5_200_000
+"""What a run takes in the document, at most: 4001 instants of 52 histories."""
 
 
 def validation(store: Store, recordings: Recordings) -> Kind:
@@ -124,9 +124,9 @@ def _cases(spec: Mapping[str, Any], runs: list[Any]) -> list[Any]:
 
 def validate_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -> WithFile:
     """On the worker: predict every run, reporting how far it is; the document as a file."""
-    from ..engine.identification.sensing import corrected
-    from ..engine.identification.sensor_model import readings_in
+    from ..engine.identification.kept_fit import fit_from_json
     from ..engine.simulation.rims_settings import RimsSettings
+    from ..engine.validation.cases import as_it_moved
     from ..engine.validation.geometry import geometry_from_json
     from ..engine.validation.validate import validate
     from ..engine.validation.validation_file import validation_to_json
@@ -135,7 +135,7 @@ def validate_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -
     fit, geometry = payload["fit"], payload["geometry"]
     fitted = [run["name"] for run in fit["runs"]]
     moved = [
-        corrected(run, readings_in(fit, fitted[place] if one["role"] == "fit" else None))
+        as_it_moved(run, fit, fitted[place] if one["role"] == "fit" else None)
         for place, (one, run) in enumerate(zip(payload["runs"], payload["recordings"], strict=True))
     ]
     found = validate(
@@ -143,6 +143,7 @@ def validate_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -
         _cases(payload, moved),
         traction=fit["traction"],
         settings=RimsSettings(**fit["settings"]),
+        fit=fit_from_json(fit),
         progress=lambda done, of: report({"predictions": done, "of": of}),
         cancelled=cancelled,
     )

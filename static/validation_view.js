@@ -34,7 +34,8 @@ const WELL = { yes: "well", weakly: "weakly", no: "not" };
 /** Sections of a validation's document; `width` of the figures in px, null to follow their box. */
 export function sections(document, width = null) {
   return [
-    section("summary", "How well the car predicts", scores(document), leftOut(document), squats(document)),
+    section("summary", "How well the car predicts", scores(document), leftOut(document), covered(document),
+      squats(document)),
     section("parameters", "Identified parameters", h("p", {}, document.fit.outcome),
       estimates(document)),
     warnings(document),
@@ -91,6 +92,28 @@ function scoreRow(one) {
     });
   return h("tr", { className: one.model === "7dof" ? "soft" : "" },
     h("td", {}, MODES[one.mode]), h("td", {}, MODELS[one.model]), cells);
+}
+
+/** How much of each output lies within the error band of its prediction, widened by the noise. */
+function covered({ runs }) {
+  const rows = runs.flatMap((run) => run.predictions
+    .filter(({ scores: of }) => OUTPUTS.some((name) => (of[name]?.coverage ?? null) !== null))
+    .map((one) => [run, one]));
+  if (!rows.length) return null;
+  const share = (score) => ((score?.coverage ?? null) === null ? "–" : units.fixed(100 * score.coverage, 1));
+  return [
+    h("h3", {}, "Within the error band"),
+    h("table", { className: "coverage" },
+      h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Samples within, %"), h("th", { scope: "col" }, "driven by"),
+        OUTPUTS.map((name) => h("th", { scope: "col" }, name.replace("chassis.", ""))))),
+      h("tbody", {}, rows.map(([run, one]) => h("tr", {},
+        h("th", { scope: "row" }, `${run.name}, ${ROLES[run.role]}`), h("td", {}, MODES[one.mode]),
+        OUTPUTS.map((name) => h("td", {}, share(one.scores[name]))))))),
+    h("p", { className: "hint" }, "Share of the samples that lie within the 95 % band of the 8-DOF prediction by the " +
+      "errors of the fit, widened by 1.96 times the channel’s noise. It is about 95 % where model, errors and " +
+      "noise are right, less where the model misses something, and more where the noise is stated too large or " +
+      "filtered."),
+  ];
 }
 
 function leftOut({ made: { left_out: names = [] } }) {
@@ -182,7 +205,7 @@ function figures(run, document, width) {
       add(channelFigure(name, [measuredLine(name, measured),
         ...[...driven].reverse().filter(({ values }) => values[name]).map((one) => ({
           label: `${MODELS[one.model]}, ${percent(one.scores[name])}`, y: display(name, one.values[name]),
-          ...LOOK[one.model] }))], ` from ${MODES[mode]}`));
+          ...LOOK[one.model] }))], ` from ${MODES[mode]}`, bandOf(name, driven)));
     }
   }
   return h("div", { className: "figures" }, drawn);
@@ -199,9 +222,16 @@ const display = (name, values) => {
 const measuredLine = (name, measured) =>
   ({ label: "measured", y: display(name, measured[name]), stroke: COLOURS.measured, width: 1 });
 
-function channelFigure(name, lines, more = "") {
+function channelFigure(name, lines, more = "", band = null) {
   const { label, display_unit: unit } = units.channel(name);
-  return { title: `${label}${more}`, unit, lines };
+  return { title: `${label}${more}`, unit, lines, band };
+}
+
+/** The error band of an output by whichever model has one, or null. */
+function bandOf(name, predictions) {
+  const values = predictions.map((one) => one.values).find((of) => of[`${name}.lower`]);
+  return values ? { label: "95 % error band", lower: display(name, values[`${name}.lower`]),
+    upper: display(name, values[`${name}.upper`]) } : null;
 }
 
 /** Sum of the drive torques, N m; null where the model gives none. */

@@ -1,14 +1,16 @@
 """The runs that a car is to predict, and what of them cannot be validated."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 
 from ..channels import OUTPUT_CHANNELS, Run
 from ..errors import ManoeuvreError, ProblemError
 from ..identification.compared_runs import distinct_names, same_data
+from ..identification.sensing import corrected
+from ..identification.sensor_model import readings_in
 from ..manoeuvre import Manoeuvre
 from ..measurement import missing_for_identification
 from ..vehicle import Vehicle
@@ -23,6 +25,23 @@ class Case:
     run: Run
     role: Role
     manoeuvre: Manoeuvre | None = None
+
+
+def as_it_moved(run: Run, fit: Mapping[str, Any], fitted: str | None) -> Run:
+    """A run with the motion behind what its sensors read, and with the noise that was found, as a
+    fit knows them.
+
+    fit : as `fit_to_json` gives it
+    fitted : what the fit calls the run; None where it has not seen it
+    """
+    seen = [one for one in fit["runs"] if fitted in (None, one["name"])]
+    noise = {
+        channel: one["noise"][channel]
+        for one in seen
+        for channel, source in one.get("noise_source", {}).items()
+        if source == "fitted"
+    }
+    return corrected(replace(run, noise={**run.noise, **noise}), readings_in(fit, fitted))
 
 
 def another_car(run: Run, vehicle: Vehicle) -> list[str]:

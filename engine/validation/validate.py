@@ -12,13 +12,14 @@ import numpy as np
 
 from ..channels import Run
 from ..errors import Cancelled
+from ..identification.kept_fit import KeptFit
 from ..manoeuvre import Manoeuvre
 from ..roads.road_spectrum import RoadSpectrum, road_spectra
 from ..simulation.rims_settings import RimsSettings
 from ..simulation.simulate import Traction
 from ..vehicle import Vehicle
 from .cases import Case, Role, another_car, check_cases
-from .prediction import Prediction, as_compared, kinds, predict
+from .prediction import Driver, Prediction, as_compared, kinds, predict
 from .squat import SquatWindow, squat_window
 
 
@@ -58,16 +59,19 @@ def validate(
     *,
     traction: Traction = "exact",
     settings: RimsSettings | None = None,
+    fit: KeptFit | None = None,
     progress: Callable[[int, int], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> Validation:
     """Let a car predict runs; a prediction that fails says why and the others go on.
 
+    fit : that found the car, whose errors make the bands; without one there are none
     progress : called with how many predictions of how many are done
     cancelled : polled before each; Cancelled is raised once it is true
     Raises what `check_cases` does.
     """
     settings = settings or RimsSettings()
+    driver = Driver(vehicle, traction, settings, fit)
     names = check_cases(cases)
     total = sum(len(kinds(case)) for case in cases)
     done, runs = 0, []
@@ -79,7 +83,7 @@ def validate(
         for mode, model in kinds(case):
             if cancelled is not None and cancelled():
                 raise Cancelled("The validation was cancelled.")
-            found.append(predict(vehicle, case, measured, window, mode, model, traction, settings))
+            found.append(predict(driver, case, measured, window, mode, model))
             done += 1
             if progress is not None:
                 progress(done, total)

@@ -85,7 +85,18 @@ def _prediction(one: Prediction, every: int) -> dict[str, Any]:
         "squat": one.squat,
         "warnings": list(one.warnings),
         "failure": one.failure,
-        "values": {} if one.run is None else _histories(one.run, PREDICTED, every),
+        "values": {} if one.run is None else _predicted(one.run, one.half_width, every),
+    }
+
+
+def _predicted(
+    run: Run, half_width: Mapping[str, NDArray[np.float64]], every: int
+) -> dict[str, list[float]]:
+    """What is kept of a prediction, with the ends of its bands as X.lower and X.upper."""
+    return _histories(run, PREDICTED, every) | {
+        f"{name}.{end}": _digits((run[name] + sign * width)[::every])
+        for name, width in half_width.items()
+        for end, sign in (("lower", -1.0), ("upper", 1.0))
     }
 
 
@@ -94,6 +105,7 @@ def _score(score: Score) -> dict[str, Any]:
     return {
         "fit_percent": score.fit_percent,
         "rms_error": score.rms_error,
+        "coverage": score.coverage,
         "rating": None if rating is None else {"overall": rating.overall, **asdict(rating)},
     }
 

@@ -49,6 +49,19 @@ def test_a_held_out_run_is_predicted_over_its_road(folder, capsys):
     assert re.search(r"manoeuvre_2\.csv \(held out\) +road \+ torque +8-DOF +96\.", printed.out)
     document = json.loads((folder / "r.json").read_text())
     fitted, held = document["runs"]
+    within = re.findall(
+        r"^manoeuvre_2\.csv \(held out\) +(?:rims|road \+ torque) +([. \d]+)$",
+        printed.out,
+        re.MULTILINE,
+    )
+    shares = [
+        [score["coverage"] for score in one["scores"].values()]
+        for one in held["predictions"]
+        if one["model"] == "8dof"
+    ]
+    told = [[float(one) for one in row.split()] for row in within]
+    assert_allclose(told, 100.0 * np.array(shares), rtol=0, atol=0.0501)
+    assert_allclose(shares, 0.95, atol=0.014)  # white noise, 4001 samples, four times
     [heads] = re.findall(r"squat, deg of pitch.*", printed.out)
     assert heads.split("  ")[-1].strip() == "7-DOF, road + torque"
     [steps] = re.findall(r"^manoeuvre_2\.csv +(-[-. \d]+)$", printed.out, re.MULTILINE)

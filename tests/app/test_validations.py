@@ -58,6 +58,11 @@ def test_the_held_out_run_is_predicted_to_its_noise(engineer, runs, done):
     for one in held["predictions"]:
         if one["model"] == "8dof":
             assert one["scores"]["chassis.z"]["rms_error"] == pytest.approx(0.5e-3, rel=0.045)
+            assert one["scores"]["chassis.z"]["coverage"] == pytest.approx(0.95, abs=0.014)
+            low, middle, high = (
+                one["values"][f"chassis.z{end}"] for end in (".lower", "", ".upper")
+            )
+            assert all(a <= b <= c for a, b, c in zip(low, middle, high, strict=True))
     shown = done["result"]["runs"][1]["predictions"]
     assert [one["scores"] for one in shown] == [one["scores"] for one in held["predictions"]]
     assert len(document["made"]["recordings"]) == 2

@@ -98,6 +98,10 @@ def test_the_fitted_car_is_validated_on_the_page(visitor):
         == "10.00"
     )
     assert visitor.element("#validation .validation-scores tbody").count() == 2
+    # Both samples' roads are known: each is predicted from its rims and over its road.
+    assert visitor.element("#validation .coverage tbody tr").count() == 2 * 2
+    figures = visitor.element("#validation figcaption")
+    assert figures.filter(has_text="95 % error band").count() == 2 * 2 * 3
     assert cut_off(visitor) == []
     with visitor.page.context.expect_page() as opened:
         visitor.click("#report")
