@@ -8,7 +8,7 @@ from typing import Any
 
 from ..engine.channels import INPUT_CHANNELS, OUTPUT_CHANNELS
 from ..engine.identification.advice_file import advisory_to_json
-from ..engine.identification.advisor import advise, advise_unmeasured
+from ..engine.identification.advisor import advise, advise_unmeasured, require_sound
 from ..engine.identification.candidates import catalogue
 from ..engine.manoeuvre import Manoeuvre, manoeuvre_from_json
 from ..engine.vehicle_file import vehicle_from_json
@@ -55,6 +55,7 @@ def advice(
             field=told,
         )
     fit = done(fitted)
+    require_sound(fit)
     spec = {**UNTOLD, **fitted.spec, "vehicle": fit["vehicle"], "start": {}}
     kept = [as_stated(store.measurement(session, run["id"]), run) for run in spec["runs"]]
     problem = build_problem(spec, marked_runs(spec, kept, recordings)).as_fitted(fit)

@@ -39,6 +39,7 @@ def _shown(kept: Measurement, of_session: Sequence[Measurement]) -> dict[str, An
         "mapping": kept.mapping,
         "needs_mapping": False,
         "sign_suggestions": [],
+        "vehicle": None,
         "same_data_as": first and first.id,
         "remarks": remarks,
         **{name: value for name, value in kept.summary.items() if name != "data_sha256"},

@@ -87,6 +87,7 @@ class Recordings:
             run,
             conditioning=done,
             noise=measurement.noise,
+            vehicle=measurement.summary.get("vehicle") or run.vehicle,
             warnings=(*run.warnings, *doubtful_noise(measurement.noise, run.channels)),
         )
 
@@ -157,9 +158,12 @@ class Recordings:
                 return NewMeasurement(name, data, *_by_names(table, noise or {}))
 
     def by_names(self, measurement: Measurement) -> tuple[dict[str, Any], dict[str, float]]:
-        """Summary and noise of a measurement's file as if it had just been sent."""
+        """Summary and noise of a measurement's file as if it had just been sent; the car that was
+        driven stays known.
+        """
         with self.table(measurement) as table:
-            return _by_names(table, measurement.noise)
+            found, noise = _by_names(table, measurement.noise)
+        return {**found, "vehicle": measurement.summary.get("vehicle") or found["vehicle"]}, noise
 
     def summed_up(self, measurement: Measurement) -> dict[str, Any]:
         """Summary of a measurement as it is used."""
@@ -306,6 +310,7 @@ def summary(run: Run, mapping: Mapping[str, Any] | None = None) -> dict[str, Any
         "missing": missing,
         "sign_suggestions": suggestions,
         "data_sha256": _digest(run),
+        "vehicle": run.vehicle or None,
     }
 
 
@@ -330,6 +335,7 @@ def _unmapped_summary(table: "Table", reason: MeasurementError) -> dict[str, Any
         "usable_for_identification": False,
         "missing": list(missing_for_identification(Run(found.source, nothing, guessed))),
         "sign_suggestions": [],
+        "vehicle": None,
     }
 
 

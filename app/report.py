@@ -43,7 +43,7 @@ _IMPORT = re.compile(r'((?:from|import) )"\./(\w+\.js)"')
 
 
 def report(document: Mapping[str, Any]) -> str:
-    """The report of a validation's document (see engine.validation_file) as HTML text."""
+    """The report of a validation's document (engine.validation.validation_file) as HTML."""
     static = package_folder("static")
     data = {"validation": document, "tables": _tables()}
     modules = _modules(static, ENTRY)
@@ -74,12 +74,15 @@ def report(document: Mapping[str, Any]) -> str:
 """
 
 
-def made(recordings: Sequence[Mapping[str, str]]) -> dict[str, Any]:
-    """How a document comes about now: date, versions, and name and SHA-256 of each recording."""
+def made(recordings: Sequence[Mapping[str, str]], left_out: Sequence[str] = ()) -> dict[str, Any]:
+    """How a document comes about now: date, versions, name and SHA-256 of each recording, and the
+    names of those that could have been predicted and were left out.
+    """
     return {
         "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "versions": {name: version(name) for name in MADE_WITH},
         "recordings": [dict(one) for one in recordings],
+        "left_out": list(left_out),
     }
 
 

@@ -112,13 +112,13 @@ def _taken(services: Services, sid: str, jid: str) -> list[Measurement]:
 
 
 def _recorded(services: Services, job: Job, recording: Mapping[str, Any]) -> NewMeasurement:
-    """A whole recording with the noise that its notes state, and what was driven."""
+    """A whole recording with the noise that its notes state, what was driven and by which car."""
     name = f"{recording['name']}.toml"
-    noise = parse_notes(_read(services, job, name), name).noise
+    notes = parse_notes(_read(services, job, name), name)
     data = _read(services, job, recording["file"])
-    new = services.recordings.recorded(data, recording["file"], noise)
+    new = services.recordings.recorded(data, recording["file"], notes.noise)
     driven = json.loads(_read(services, job, f"{recording['name']}.manoeuvre.json"))
-    return replace(new, manoeuvre=driven)
+    return replace(new, manoeuvre=driven, summary={**new.summary, "vehicle": notes.vehicle})
 
 
 def _ended(services: Services, sid: str, jid: str) -> Job:

@@ -137,15 +137,16 @@ def _note(services: Services, sid: str, mid: str, received: Upload) -> Measureme
     data = received.read(services.settings.limits.body_bytes)
     notes = parse_notes(data, received.name)
     noise, done = dict(notes.noise), [step_record_to_json(one) for one in notes.conditioning]
-    if not done and not noise.keys() & set(OUTPUT_CHANNELS):
+    if not (done or notes.vehicle or noise.keys() & set(OUTPUT_CHANNELS)):
         raise MeasurementError(
             f"{received.name} states no noise of {', '.join(OUTPUT_CHANNELS)}; write [noise] and "
             'below it lines such as "chassis.z" = 0.0005, in SI.'
         )
+    told = {**kept.summary, "vehicle": notes.vehicle or kept.summary.get("vehicle")}
     if kept.summary.get("needs_mapping"):
-        return services.store.set_notes(sid, kept.id, noise, done, kept.summary)
+        return services.store.set_notes(sid, kept.id, noise, done, told)
     known = dict(services.recordings.parse(kept, noise).noise)
-    noted = replace(kept, noise=known, conditioned=done or None)
+    noted = replace(kept, noise=known, conditioned=done or None, summary=told)
     found = services.recordings.summed_up(noted)
     return services.store.set_notes(sid, kept.id, known, done, found)
 

@@ -21,8 +21,8 @@ from .worker import Report, WithFile
 
 KIND = "validation"
 
-BYTES_A_RUN = 4_000_000
-"""What a run takes in the document, at most: 4001 instants of 40 histories."""
+BYTES_A_RUN = 5_200_000
+"""What a run takes in the document, at most: 4001 instants of 52 histories."""
 
 
 def validation(store: Store, recordings: Recordings) -> Kind:
@@ -43,7 +43,8 @@ def check_and_fill(
     limits: Limits,
 ) -> dict[str, Any]:
     """Everything that the job needs, checked."""
-    from ..engine.validation import check_cases, geometry_from_json
+    from ..engine.validation.cases import check_cases
+    from ..engine.validation.geometry import geometry_from_json
 
     fit = done(fitted)
     held = [store.measurement(session, one) for one in request.hold_out]
@@ -69,7 +70,19 @@ def check_and_fill(
         geometry_from_json(request.geometry)
     check_budget(kept, fit["settings"]["step"], limits)
     check_cases(_cases(spec, _runs(spec, session, store, recordings)))
-    return {**spec, "recorded": [{"name": one.name, "sha256": one.sha256} for one in kept]}
+    data = set(map(_data, kept))
+    left_out = [
+        one.name
+        for one in store.measurements(session)
+        if _data(one) not in data and one.summary["usable_for_identification"]
+    ]
+    recorded = [{"name": one.name, "sha256": one.sha256} for one in kept]
+    return {**spec, "recorded": recorded, "left_out": left_out}
+
+
+def _data(kept: Measurement) -> str:
+    """What stands for a recording's data, however they are written."""
+    return kept.summary.get("data_sha256") or kept.sha256
 
 
 def _driven(request: ValidationRequest, kept: Sequence[Measurement]) -> dict[str, Any]:
@@ -100,7 +113,7 @@ def _runs(spec: Mapping[str, Any], session: str, store: Store, recordings: Recor
 def _cases(spec: Mapping[str, Any], runs: list[Any]) -> list[Any]:
     """The engine's cases."""
     from ..engine.manoeuvre import manoeuvre_from_json
-    from ..engine.validation import Case
+    from ..engine.validation.cases import Case
 
     driven = {one: manoeuvre_from_json(data) for one, data in spec["manoeuvres"].items()}
     return [
@@ -111,17 +124,18 @@ def _cases(spec: Mapping[str, Any], runs: list[Any]) -> list[Any]:
 
 def validate_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -> WithFile:
     """On the worker: predict every run, reporting how far it is; the document as a file."""
-    from ..engine.identification.sensing import corrected
-    from ..engine.identification.sensor_model import readings_in
+    from ..engine.identification.kept_fit import fit_from_json
     from ..engine.simulation.rims_settings import RimsSettings
-    from ..engine.validation import geometry_from_json, validate
-    from ..engine.validation_file import validation_to_json
+    from ..engine.validation.cases import as_it_moved
+    from ..engine.validation.geometry import geometry_from_json
+    from ..engine.validation.validate import validate
+    from ..engine.validation.validation_file import validation_to_json
     from .report import made
 
     fit, geometry = payload["fit"], payload["geometry"]
     fitted = [run["name"] for run in fit["runs"]]
     moved = [
-        corrected(run, readings_in(fit, fitted[place] if one["role"] == "fit" else None))
+        as_it_moved(run, fit, fitted[place] if one["role"] == "fit" else None)
         for place, (one, run) in enumerate(zip(payload["runs"], payload["recordings"], strict=True))
     ]
     found = validate(
@@ -129,6 +143,7 @@ def validate_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -
         _cases(payload, moved),
         traction=fit["traction"],
         settings=RimsSettings(**fit["settings"]),
+        fit=fit_from_json(fit),
         progress=lambda done, of: report({"predictions": done, "of": of}),
         cancelled=cancelled,
     )
@@ -136,11 +151,11 @@ def validate_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -
         found,
         fit,
         None if geometry is None else geometry_from_json(geometry),
-        made(payload["recorded"]),
+        made(payload["recorded"], payload.get("left_out", ())),
     )
     summary = [
         {
-            **{name: run[name] for name in ("name", "role", "squat")},
+            **{name: run[name] for name in ("name", "role", "findings", "squat")},
             "predictions": [
                 {name: value for name, value in one.items() if name != "values"}
                 for one in run["predictions"]

@@ -369,6 +369,7 @@ class Run:
     warnings : sentences about what is doubtful in the recording
     braking : (begin, end) in s where the car brakes; None to look for it in a_x
     conditioning : what made these channels of those that were recorded, step by step
+    vehicle : name of the car that was driven, where it is known
     """
 
     name: str
@@ -379,6 +380,7 @@ class Run:
     description: str = ""
     braking: tuple[tuple[float, float], ...] | None = None
     conditioning: tuple[StepRecord, ...] = ()
+    vehicle: str = ""
 
     def __post_init__(self) -> None:
         """Check the shapes and bring the channels into the table's order."""

@@ -73,7 +73,8 @@ def read_run(path: str | Path, *, noise: Mapping[str, float] | None = None) -> R
     try:
         with opened(path, path.name) as table:
             run = named_run(table, {**notes.noise, **(noise or {})}, notes.description)
-            return replace(run, conditioning=notes.conditioning)
+            vehicle = notes.vehicle or run.vehicle
+            return replace(run, conditioning=notes.conditioning, vehicle=vehicle)
     except OSError as error:
         raise MeasurementError(
             f"{path}: the file cannot be read ({error.strerror}); check the path."
@@ -138,13 +139,14 @@ def named_run(table: Table, noise: Mapping[str, float], description: str) -> Run
             table, chosen, noise=noise, description=description, warnings=warnings
         )
     said = notes_in(table.comment)
-    return run_from_table(
+    run = run_from_table(
         table,
         chosen,
         noise={**said.noise, **noise},
         description=description or said.description,
         warnings=[*table.warnings, *warnings],
     )
+    return replace(run, vehicle=said.vehicle)
 
 
 def run_from_table(

@@ -1,13 +1,14 @@
 """What is known about a recording, in a TOML file beside it:
 
     description = "Manoeuvre 2, wet road"
+    vehicle = "BMW 320i"     # that was driven, as its file names it
 
     [noise]                  # standard deviation of the measurement noise by channel, SI
     "chassis.z" = 0.0005     # the quotes may be left off
 
     [[conditioning]]         # what `ridetune condition` did, step by step
 
-Other keys are for other readers, such as the vehicle that was driven.
+Other keys are for other readers.
 """
 
 import math
@@ -48,11 +49,14 @@ _NOISE_LINE = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class RunNotes:
-    """Noise in SI by channel, a text for a person, and what conditioning did to the recording."""
+    """Noise in SI by channel, a text for a person, what conditioning did to the recording, and the
+    name of the car that was driven.
+    """
 
     noise: Mapping[str, float] = field(default_factory=dict)
     description: str = ""
     conditioning: tuple[StepRecord, ...] = ()
+    vehicle: str = ""
 
 
 def notes_beside(recording: Path) -> Path:
@@ -74,23 +78,28 @@ def parse_notes(data: bytes, source: str) -> RunNotes:
     """The notes in the bytes of a file; `source` heads every message."""
     notes = parse_toml(data, source)
     for name in notes:
-        near = get_close_matches(name.lower(), ("noise", "description"), n=1, cutoff=0.75)
+        near = get_close_matches(
+            name.lower(), ("noise", "description", "vehicle"), n=1, cutoff=0.75
+        )
         if near and near[0] != name:
             raise MeasurementError(f"{source}: {name} is not known; did you mean {near[0]}?")
-    noise, description = notes.get("noise", {}), notes.get("description", "")
-    if not isinstance(description, str):
-        raise MeasurementError(f"{source}: description must be a text in quotes.")
+    noise = notes.get("noise", {})
+    texts = {name: notes.get(name, "") for name in ("description", "vehicle")}
+    for name, text in texts.items():
+        if not isinstance(text, str):
+            raise MeasurementError(f"{source}: {name} must be a text in quotes.")
     if not isinstance(noise, dict):
         raise MeasurementError(
             f'{source}: noise must be a table: [noise] and lines such as "chassis.z" = 0.0005.'
         )
     done = step_records_from_json(notes.get("conditioning", []), source)
-    return RunNotes(checked_noise(_flat(noise), source), description, done)
+    return RunNotes(checked_noise(_flat(noise), source), conditioning=done, **texts)
 
 
 def notes_of(run: Run) -> str:
     """What a run knows of itself as the text of a file that `parse_notes` reads."""
     lines = [f"description = {toml_value(run.description)}"]
+    lines += [f"vehicle = {toml_value(run.vehicle)}"] if run.vehicle else []
     lines += toml_table("[noise]", run.noise)
     for record in map(step_record_to_json, run.conditioning):
         lists = {name: one for name, one in record.items() if isinstance(one, list)}
@@ -103,13 +112,14 @@ def notes_of(run: Run) -> str:
 
 def notes_in(comment: str) -> RunNotes:
     """The notes that a recording of ours carries in its own header, one a line; see `mdf4`."""
-    description = re.search(r"^description: (.*)$", comment, re.MULTILINE)
+    said = re.findall(r"^(description|vehicle): (.*)$", comment, re.MULTILINE)
+    texts = dict(reversed(said))  # the first of each counts
     noise = {}
     for name, value, unit in _NOISE_LINE.findall(comment):
         info = find_channel(name)
         if info is not None and info.unit == unit:
             noise[name] = float(value)
-    return RunNotes(noise, description[1].strip() if description else "")
+    return RunNotes(noise, **{name: text.strip() for name, text in texts.items()})
 
 
 def checked_noise(noise: Mapping[str, Any], source: str) -> dict[str, float]:

@@ -122,7 +122,7 @@ async function scoreHoldouts() {
   const used = new Set(fitted.runs.map(({ id }) => id));
   const seen = get("measurements").filter(({ id }) => used.has(id));
   const ids = Object.keys(holdouts).length ? Object.keys(holdouts)
-    : setup.heldOut(seen).map(({ id }) => id);
+    : setup.heldOut(seen, fitted.result.vehicle.name).map(({ id }) => id);
   for (const id of ids) {
     try {
       const run = await api.simulate({

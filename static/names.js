@@ -25,6 +25,9 @@ export function nameOf(id) {
   return at < 0 ? null : distinct(rows.map(({ name }) => name))[at];
 }
 
+/** Whether a recording is known to be of another car than the one of that name. */
+export const ofAnotherCar = ({ vehicle }, name) => Boolean(vehicle) && vehicle !== name;
+
 /** Why a recording is of no use for identification. */
 export const lacks = (row) => row.needs_mapping
   ? "Its columns are not mapped to channels yet"

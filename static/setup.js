@@ -2,7 +2,7 @@
 
 import { breakable, h } from "./dom.js";
 import * as free from "./free.js";
-import { dataOf, lacks, nameOf, original } from "./names.js";
+import { dataOf, lacks, nameOf, ofAnotherCar, original } from "./names.js";
 import * as noise from "./noise.js";
 import * as preparation from "./preparation.js";
 import * as search from "./search_form.js";
@@ -10,21 +10,24 @@ import { get, set } from "./store.js";
 
 const USES = { fit: "fit", hold_out: "hold out", leave_out: "leave out" };
 
-/** How a run is used: unless chosen, the ride on show (or the first) is fitted, others held out. */
-function useOf(run) {
+/**
+ * How a run is used: unless chosen, the ride on show (or the first) is fitted and others held out, but
+ * those of another car than the one of that name.
+ */
+function useOf(run, car = get("vehicle").name) {
   if (!run.usable_for_identification) return "leave_out";
   if (get("use")[run.id]) return get("use")[run.id];
   const usable = get("measurements").filter((m) => m.usable_for_identification);
   const { kind, id } = get("ride");
   const shown = usable.find((m) => kind === "measurement" && m.id === id) ?? usable[0];
   if (run === shown) return "fit";
-  return dataOf(run) === dataOf(shown) || original(run) ? "leave_out" : "hold_out";
+  return dataOf(run) === dataOf(shown) || original(run) || ofAnotherCar(run, car) ? "leave_out" : "hold_out";
 }
 
 export const fitted = () => get("measurements").filter((run) => useOf(run) === "fit");
 
 /** Runs to score beside those fitted: what was fitted under another name is not unseen. */
-export const heldOut = (seen) => unseen(seen).filter((run) => useOf(run) !== "leave_out");
+export const heldOut = (seen, car) => unseen(seen).filter((run) => useOf(run, car) !== "leave_out");
 
 /** Usable runs with other data than these. */
 export function unseen(seen) {
@@ -61,7 +64,7 @@ function runRow(run, used) {
       ? h("span", { className: "run-use" },
           select(USES, useOf(run), choose, { "aria-label": `Use of ${nameOf(run.id)}` }),
           h("label", {}, "brakes", preparation.brakingField(run)),
-          copied(run))
+          copied(run), ofAnother(run))
       : h("span", { className: "badge", title: `${lacks(run)}.` }, "not for fitting"));
 }
 
@@ -71,6 +74,11 @@ function copied(run) {
   const twice = useOf(first) === "fit" && useOf(run) === "fit";
   return h("span", { className: twice ? "worse" : "hint" }, "the same data as ", breakable(nameOf(first.id)),
     twice ? ", which so counts twice" : "");
+}
+
+function ofAnother(run) {
+  return ofAnotherCar(run, get("vehicle").name)
+    ? h("span", { className: "hint" }, "recorded with another car: ", run.vehicle) : null;
 }
 
 function select(options, value, change, properties) {

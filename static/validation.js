@@ -3,11 +3,12 @@
 import * as api from "./api.js";
 import { $, h, inPlace } from "./dom.js";
 import { jobs } from "./job.js";
-import { nameOf } from "./names.js";
+import { nameOf, ofAnotherCar } from "./names.js";
 import { refused } from "./notices.js";
 import * as pivots from "./pivots.js";
 import { brakingOf } from "./preparation.js";
-import { unseen } from "./setup.js";
+import { heldOut, unseen } from "./setup.js";
+import { stagesOf } from "./stages.js";
 import { get, on } from "./store.js";
 import { sections } from "./validation_view.js";
 import { worded } from "./wording.js";
@@ -15,8 +16,8 @@ import { worded } from "./wording.js";
 /** The choice of what is kept with the recording. */
 const KEPT = "kept";
 
-/** The role of each run that the fit has not seen, and what was driven, as they were chosen. */
-const left = new Set();
+/** By run, whether it is held out and what was driven, where that was chosen here. */
+const held = {};
 const told = {};
 
 /** {id, scores} of the last one that is done, with its histories. */
@@ -28,7 +29,7 @@ export { current };
 
 /** Build the panel. */
 export function build() {
-  on("fitJob measurements", show);
+  on("fitJob measurements use", show);
   show();
 }
 
@@ -39,22 +40,30 @@ export async function resume() {
   show();
 }
 
-/** Recordings of the fit, and those that it has not seen. */
+/**
+ * Recordings of the fit, those that it has not seen, and which of these are held out: unless chosen here,
+ * as they are used in the set-up.
+ */
 function runs() {
   const used = new Set(get("fitJob").runs.map(({ id }) => id));
   const seen = get("measurements").filter(({ id }) => used.has(id));
-  return { seen, others: unseen(seen) };
+  const others = unseen(seen);
+  const usual = new Set(heldOut(seen, car()));
+  return { seen, others, holdOut: others.filter((run) => held[run.id] ?? usual.has(run)) };
 }
 
+/** Name of the car that predicts. */
+const car = () => get("fit").vehicle.name;
+
 function request() {
-  const { seen, others } = runs();
-  const held = others.filter(({ id }) => !left.has(id)).map(({ id }) => id);
-  const chosen = [...seen.map(({ id }) => id), ...held];
+  const { seen, holdOut } = runs();
+  const ids = holdOut.map(({ id }) => id);
+  const chosen = [...seen.map(({ id }) => id), ...ids];
   return {
     identification: get("fitJob").id,
-    hold_out: held,
+    hold_out: ids,
     manoeuvres: Object.fromEntries(chosen.filter((id) => id in told).map((id) => [id, told[id]])),
-    braking: brakingOf(held),
+    braking: brakingOf(ids),
     geometry: pivots.geometry(),
   };
 }
@@ -79,12 +88,12 @@ function content() {
     return [h("p", { className: "empty" },
       "No fit yet. Identify the car first; then it can be held against runs that it has not seen.")];
   }
-  const { seen, others } = runs();
+  const { seen, others, holdOut } = runs();
   const job = current();
   const scores = found?.id === job?.id ? found?.scores : null;
   return [
     h("ul", { className: "runs" }, seen.map((run) => runRow(run, h("span", { className: "soft" }, "fitted"))),
-      others.map((run) => runRow(run, held(run)))),
+      others.map((run) => runRow(run, holding(run, holdOut.includes(run))))),
     pivots.view(),
     h("div", { className: "row-tools" },
       busy() ? h("button", { type: "button", id: "cancel-validation", className: "danger", on: { click: cancel } },
@@ -115,7 +124,14 @@ function runRow(run, role) {
   h("option", { value: "", selected: told[run.id] === null }, "manoeuvre not known"),
   manoeuvres.map(({ key, name }) => h("option", { value: key, selected: told[run.id] === key }, name)));
   return h("li", {}, h("span", { className: "run-name", title: nameOf(run.id) }, nameOf(run.id)),
-    h("span", { className: "run-use" }, role, choice));
+    h("span", { className: "run-use" }, role, choice), remark(run));
+}
+
+/** Why a run may say little of the car. */
+function remark(run) {
+  const signs = stagesOf(run).find(({ state }) => state === "look");
+  const said = [ofAnotherCar(run, car()) ? `Recorded with another car: ${run.vehicle}.` : "", signs?.told ?? ""];
+  return said.some(Boolean) ? h("p", { className: "doubt" }, said.filter(Boolean).join(" ")) : null;
 }
 
 function tell(id, value) {
@@ -123,9 +139,8 @@ function tell(id, value) {
   else told[id] = value || null;
 }
 
-function held(run) {
-  const box = h("input", { type: "checkbox", checked: !left.has(run.id),
-    "aria-label": `Hold out ${nameOf(run.id)}`,
-    on: { change: () => (box.checked ? left.delete(run.id) : left.add(run.id)) } });
+function holding(run, checked) {
+  const box = h("input", { type: "checkbox", checked, "aria-label": `Hold out ${nameOf(run.id)}`,
+    on: { change: () => { held[run.id] = box.checked; } } });
   return h("label", { className: "inline" }, box, "hold out");
 }

@@ -34,7 +34,8 @@ const WELL = { yes: "well", weakly: "weakly", no: "not" };
 /** Sections of a validation's document; `width` of the figures in px, null to follow their box. */
 export function sections(document, width = null) {
   return [
-    section("summary", "How well the car predicts", scores(document), squats(document)),
+    section("summary", "How well the car predicts", scores(document), leftOut(document), covered(document),
+      squats(document)),
     section("parameters", "Identified parameters", h("p", {}, document.fit.outcome),
       estimates(document)),
     warnings(document),
@@ -54,6 +55,9 @@ const described = (run) => `${units.number(run.duration, 4)} s, ${run.samples} s
 const shown = (name, value, digits = 3) =>
   units.number(value === null ? NaN : value * units.channel(name).display_factor, digits);
 
+/** Why a run says little of the car; documents of earlier versions do not tell. */
+const findingsOf = ({ findings = [] }) => findings;
+
 /** Fit percent, rms error and rating of every prediction. */
 function scores({ runs }) {
   const heads = OUTPUTS.map((name) => units.channel(name));
@@ -69,6 +73,8 @@ function scores({ runs }) {
     runs.map((run) => h("tbody", {},
       h("tr", {}, h("th", { colSpan: 2 + 3 * OUTPUTS.length, scope: "rowgroup" },
         `${run.name}, ${ROLES[run.role]}`)),
+      findingsOf(run).map((text) => h("tr", {},
+        h("td", { colSpan: 2 + 3 * OUTPUTS.length, className: "said doubt" }, worded(text)))),
       run.predictions.map((one) => scoreRow(one))))));
 }
 
@@ -86,6 +92,32 @@ function scoreRow(one) {
     });
   return h("tr", { className: one.model === "7dof" ? "soft" : "" },
     h("td", {}, MODES[one.mode]), h("td", {}, MODELS[one.model]), cells);
+}
+
+/** How much of each output lies within the error band of its prediction, widened by the noise. */
+function covered({ runs }) {
+  const rows = runs.flatMap((run) => run.predictions
+    .filter(({ scores: of }) => OUTPUTS.some((name) => (of[name]?.coverage ?? null) !== null))
+    .map((one) => [run, one]));
+  if (!rows.length) return null;
+  const share = (score) => ((score?.coverage ?? null) === null ? "–" : units.fixed(100 * score.coverage, 1));
+  return [
+    h("h3", {}, "Within the error band"),
+    h("table", { className: "coverage" },
+      h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Samples within, %"), h("th", { scope: "col" }, "driven by"),
+        OUTPUTS.map((name) => h("th", { scope: "col" }, name.replace("chassis.", ""))))),
+      h("tbody", {}, rows.map(([run, one]) => h("tr", {},
+        h("th", { scope: "row" }, `${run.name}, ${ROLES[run.role]}`), h("td", {}, MODES[one.mode]),
+        OUTPUTS.map((name) => h("td", {}, share(one.scores[name]))))))),
+    h("p", { className: "hint" }, "Share of the samples that lie within the 95 % band of the 8-DOF prediction by the " +
+      "errors of the fit, widened by 1.96 times the channel’s noise. It is about 95 % where model, errors and " +
+      "noise are right, less where the model misses something, and more where the noise is stated too large or " +
+      "filtered."),
+  ];
+}
+
+function leftOut({ made: { left_out: names = [] } }) {
+  return names.length ? h("p", { className: "hint" }, `Neither fitted nor held out: ${names.join(", ")}.`) : null;
 }
 
 /** The step of the pitch while the car accelerates: what the 7-DOF model cannot give on a road. */
@@ -139,9 +171,10 @@ function estimates({ fit, geometry }) {
     }))));
 }
 
+/** What is doubtful, but for what stands beside the scores. */
 function warnings({ fit, runs }) {
-  const said = [...fit.warnings, ...runs.flatMap(({ name, predictions }) =>
-    predictions.flatMap((one) => one.warnings.map((text) =>
+  const said = [...fit.warnings, ...runs.flatMap(({ name, predictions, ...run }) =>
+    predictions.flatMap((one) => one.warnings.filter((text) => !findingsOf(run).includes(text)).map((text) =>
       (text.includes(name) ? text : `${name}: ${text}`))))];
   const texts = [...new Set(said)];
   if (!texts.length) return null;
@@ -172,7 +205,7 @@ function figures(run, document, width) {
       add(channelFigure(name, [measuredLine(name, measured),
         ...[...driven].reverse().filter(({ values }) => values[name]).map((one) => ({
           label: `${MODELS[one.model]}, ${percent(one.scores[name])}`, y: display(name, one.values[name]),
-          ...LOOK[one.model] }))], ` from ${MODES[mode]}`));
+          ...LOOK[one.model] }))], ` from ${MODES[mode]}`, bandOf(name, driven)));
     }
   }
   return h("div", { className: "figures" }, drawn);
@@ -189,9 +222,16 @@ const display = (name, values) => {
 const measuredLine = (name, measured) =>
   ({ label: "measured", y: display(name, measured[name]), stroke: COLOURS.measured, width: 1 });
 
-function channelFigure(name, lines, more = "") {
+function channelFigure(name, lines, more = "", band = null) {
   const { label, display_unit: unit } = units.channel(name);
-  return { title: `${label}${more}`, unit, lines };
+  return { title: `${label}${more}`, unit, lines, band };
+}
+
+/** The error band of an output by whichever model has one, or null. */
+function bandOf(name, predictions) {
+  const values = predictions.map((one) => one.values).find((of) => of[`${name}.lower`]);
+  return values ? { label: "95 % error band", lower: display(name, values[`${name}.lower`]),
+    upper: display(name, values[`${name}.upper`]) } : null;
 }
 
 /** Sum of the drive torques, N m; null where the model gives none. */

@@ -17,7 +17,7 @@ from ridetune.engine.manoeuvre import read_manoeuvre
 from ridetune.engine.measurement import missing_for_identification, read_run
 from ridetune.engine.run_notes import manoeuvre_beside
 from ridetune.engine.sensor_file import read_sensors
-from ridetune.engine.validation import geometry_from_json
+from ridetune.engine.validation.geometry import geometry_from_json
 from ridetune.engine.vehicle_file import read_vehicle, reference_vehicles, vehicle_to_json
 
 FOLDER = Path(__file__).parents[1] / "sample_runs"

@@ -9,9 +9,10 @@ from pathlib import Path
 
 from ...engine.errors import VehicleError
 from ...engine.identification.advice_file import advisory_to_json
-from ...engine.identification.advisor import Advisory, advise_unmeasured
+from ...engine.identification.advisor import Advisory, advise_unmeasured, require_sound
 from ...engine.identification.advisor import advise as advise_after
 from ...engine.identification.candidates import catalogue
+from ...engine.identification.fit_file import fit_to_json
 from ...engine.identification.identify import identify
 from ...engine.identification.kept_fit import fit_from_json, is_fit
 from ...engine.identification.problem import Problem
@@ -67,14 +68,12 @@ def _problem(options: Namespace, noise: Mapping[str, float]) -> Problem:
     data = read_json(Path(options.vehicle), VehicleError) if _is_json(options.vehicle) else None
     if not is_fit(data):
         problem = Problem.build(find_vehicle(options.vehicle), runs)
-        fit = identify(problem)
-        print(fit.outcome)
-        return replace(
-            problem,
-            vehicle=fit.vehicle,
-            free=tuple(replace(one.free, start=one.value) for one in fit.parameters),
-        )
+        fitted = fit_to_json(identify(problem))
+        print(fitted["outcome"])
+        require_sound(fitted)
+        return problem.as_fitted(fitted)
     fit = fit_from_json(data, Path(options.vehicle).name)
+    require_sound(fit.ended)
     return Problem.build(
         fit.vehicle,
         [replace(run, braking=fit.braking.get(run.name) or run.braking) for run in runs],

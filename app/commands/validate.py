@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -11,20 +12,15 @@ from typing import Any
 from ...engine.channels import Run
 from ...engine.errors import VehicleError
 from ...engine.identification.fit_file import fit_to_json
-from ...engine.identification.sensing import corrected
-from ...engine.identification.sensor_model import readings_in
+from ...engine.identification.kept_fit import fit_from_json
 from ...engine.json_text import read_json
 from ...engine.manoeuvre import Manoeuvre, read_manoeuvre
 from ...engine.run_notes import manoeuvre_beside
-from ...engine.validation import (
-    Case,
-    Geometry,
-    Validation,
-    check_cases,
-    geometry_from_json,
-)
-from ...engine.validation import validate as predict
-from ...engine.validation_file import validation_to_json
+from ...engine.validation.cases import Case, as_it_moved, check_cases
+from ...engine.validation.geometry import Geometry, geometry_from_json
+from ...engine.validation.validate import ValidatedRun, Validation
+from ...engine.validation.validate import validate as predict
+from ...engine.validation.validation_file import validation_to_json
 from ..report import made, report
 from .arguments import ArgumentError, place_of, rims_settings
 from .identify import asked, fitted, print_fit
@@ -58,9 +54,13 @@ def validate(options: Namespace) -> None:
     found = fit_to_json(fit)
     validation = predict(
         fit.vehicle,
-        [_as_it_moved(case, found, place) for place, case in enumerate(cases)],
+        [
+            replace(case, run=as_it_moved(case.run, found, _fitted_name(case, found, place)))
+            for place, case in enumerate(cases)
+        ],
         traction=options.traction or "exact",
         settings=rims_settings(options),
+        fit=fit_from_json(found),
     )
     print()
     _print(validation)
@@ -124,10 +124,9 @@ def _cases(runs: Sequence[Run], fits: int, manoeuvres: dict[int, Manoeuvre]) -> 
     ]
 
 
-def _as_it_moved(case: Case, fit: Mapping[str, Any], place: int) -> Case:
-    """A case with the motion behind what its sensors read, as the fit knows them."""
-    name = fit["runs"][place]["name"] if case.role == "fit" else None
-    return replace(case, run=corrected(case.run, readings_in(fit, name)))
+def _fitted_name(case: Case, fit: Mapping[str, Any], place: int) -> str | None:
+    """What the fit calls a run that it has seen."""
+    return fit["runs"][place]["name"] if case.role == "fit" else None
 
 
 def _print(validation: Validation) -> None:
@@ -144,12 +143,59 @@ def _print(validation: Validation) -> None:
                 f"{one.scores[name].fit_percent:.1f}" if name in one.scores else "-"
                 for name in names
             ]
-            what = f"{run.name} ({'fitted' if run.role == 'fit' else 'held out'})"
-            rows.append([what, DRIVEN_BY[one.mode], MODELS[one.model], *scores])
+            rows.append([_what(run), DRIVEN_BY[one.mode], MODELS[one.model], *scores])
     print_table(rows, right=range(3, 3 + len(names)))
+    _print_coverage(validation.runs, names)
+    _print_squats(validation.runs)
+    print_warnings(finding for run in validation.runs for finding in run.findings)
     print_warnings(
         f"{run.name}, {DRIVEN_BY[one.mode]}, {MODELS[one.model]}: {one.failure}"
         for run in validation.runs
         for one in run.predictions
         if one.failure
     )
+
+
+def _print_coverage(runs: Sequence[ValidatedRun], names: Sequence[str]) -> None:
+    """Print how much of each channel lies within the error band of its prediction and the noise."""
+    rows = [["within 95 % band and noise, percent", "driven by", *names]]
+    for run in runs:
+        for one in run.predictions:
+            if one.half_width:
+                within = [
+                    one.scores[name].coverage if name in one.scores else None for name in names
+                ]
+                shares = ("-" if share is None else f"{100.0 * share:.1f}" for share in within)
+                rows.append([_what(run), DRIVEN_BY[one.mode], *shares])
+    if len(rows) > 1:
+        print()
+        print_table(rows, right=range(2, 2 + len(names)))
+
+
+def _what(run: ValidatedRun) -> str:
+    return f"{run.name} ({'fitted' if run.role == 'fit' else 'held out'})"
+
+
+def _print_squats(runs: Sequence[ValidatedRun]) -> None:
+    """Print the step of the pitch, measured and predicted, of the runs that have one."""
+    squatting = [run for run in runs if run.squat is not None]
+    kinds = list(
+        dict.fromkeys((one.mode, one.model) for run in squatting for one in run.predictions)
+    )
+    if not squatting:
+        return
+    rows = [
+        [
+            "squat, deg of pitch",
+            "measured",
+            *(f"{MODELS[model]}, {DRIVEN_BY[mode]}" for mode, model in kinds),
+        ]
+    ]
+    for run in squatting:
+        predicted = {(one.mode, one.model): one.squat for one in run.predictions}
+        steps = [run.squat, *(predicted.get(kind) for kind in kinds)]
+        rows.append(
+            [run.name, *("-" if step is None else f"{math.degrees(step):.3f}" for step in steps)]
+        )
+    print()
+    print_table(rows, right=range(1, 2 + len(kinds)))

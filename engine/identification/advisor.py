@@ -25,6 +25,7 @@ import time
 from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +41,8 @@ from ..units import in_percent
 from ..vehicle import Vehicle
 from .candidates import Drive, catalogue, drives
 from .expected_noise import INPUT_NOISE, ExpectedNoise, noise_of_runs, stated_noise
-from .fit import determined
+from .fit import Outcome, determined
+from .fit_findings import fault_sentences, faults_of_channels
 from .new_run import of_all_runs, said_by
 from .problem import FreeParameter, Problem
 from .residuals import FAILED_TRIAL, Residuals
@@ -139,7 +141,8 @@ def advise(
 
     candidates : by key; those of `catalogue` without
     planned : keys of candidates that will be driven in any case, so that they count as known
-    Raises what `Residuals` does, and ProblemError where the car does not come through the runs.
+    Raises what `Residuals` does, and ProblemError where the car does not come through the runs or
+    one of them is probably wrong.
     """
     began = time.perf_counter()
     residuals = Residuals(problem, rims_batch)
@@ -149,11 +152,24 @@ def advise(
         raise ProblemError(
             "The car does not come through the runs at these values; fit it to the runs first."
         )
+    if faults := fault_sentences(
+        problem.runs, faults_of_channels(problem.runs, residuals.model(x))
+    ):
+        raise ProblemError(" ".join(faults))
     runs = residuals.of_runs(r, residuals.jacobian(x))
     said = information(runs)
     noise = noise_of_runs(problem, runs, said.root)
     known = sum(residuals.of_priors(), start=said).marginal(of_all_runs(problem.variables))
     return _advised(problem, known, noise, candidates or catalogue(), planned, began)
+
+
+def require_sound(fit: Mapping[str, Any]) -> None:
+    """Raise ProblemError for a fit, given as JSON, to runs that are probably wrong: it has bent the
+    car until the two look alike.
+    """
+    if fit.get("outcome") == Outcome.DOUBTFUL:
+        # Fits of earlier versions do not list their faults.
+        raise ProblemError(" ".join(fit.get("faults", ())) or Outcome.DOUBTFUL)
 
 
 def advise_unmeasured(

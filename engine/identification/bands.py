@@ -15,7 +15,7 @@ as far as the bounds admit them, and along unknown directions evenly; the band l
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +24,9 @@ from scipy.stats import norm
 from ..channels import Run
 from ..errors import ProblemError, RideError, SimulationError
 from ..parameters import parameter
-from ..simulation.excitation import Excitation
 from ..simulation.integration import cores
 from ..simulation.metrics import metrics
-from ..simulation.simulate import Model
+from ..simulation.simulate import Model, Simulation
 from ..vehicle import Vehicle
 from .kept_fit import KeptFit
 from .problem import FreeParameter
@@ -47,6 +46,18 @@ DRAWS = 100
 
 STEP = 1e-4
 """Of the differences of x: their error is of its square, that of rounding 1e-12 over it."""
+
+
+class Ride(Protocol):
+    """What cars go through, such as an `Excitation`."""
+
+    def for_cars(self, cars: Sequence[Vehicle]) -> Self:
+        """The same with one step for some cars."""
+        ...
+
+    def simulate(self, vehicle: Vehicle, model: Model) -> Simulation:
+        """One car through all of it."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,14 +93,14 @@ class _Curves:
 def bands(
     fit: KeptFit,
     vehicle: Vehicle,
-    excitation: Excitation,
+    ride: Ride,
     *,
     method: Method = "linear",
     cars: int = CARS,
     seed: int = 0,
     model: Model = "8dof",
 ) -> Bands:
-    """Bands of a car that goes through an excitation.
+    """Bands of a car that goes through a ride.
 
     vehicle : around which; the fit's, or one that differs from it in what was not free
     cars, seed : of the sampling
@@ -100,7 +111,7 @@ def bands(
 
     def predicted(trials: Sequence[Array]) -> _Curves:
         driven = [_vehicle_at(fit.free, vehicle, trial) for trial in trials]
-        return _curves(driven, excitation.for_cars([vehicle]), model)
+        return _curves(driven, ride.for_cars([vehicle]), model)
 
     if method == "linear":
         return _linear(fit.free, x, fit.errors, predicted)
@@ -260,12 +271,12 @@ def _vehicle_at(free: Sequence[FreeParameter], vehicle: Vehicle, x: Array) -> Ve
         return None
 
 
-def _curves(cars: Sequence[Vehicle | None], excitation: Excitation, model: Model) -> _Curves:
+def _curves(cars: Sequence[Vehicle | None], ride: Ride, model: Model) -> _Curves:
     """Curves and figures of some cars; the first must come through."""
 
     def simulated(car: Vehicle | None) -> Run | None:
         try:
-            return None if car is None else excitation.simulate(car, model).run
+            return None if car is None else ride.simulate(car, model).run
         except SimulationError:
             if car is cars[0]:
                 raise

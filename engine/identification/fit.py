@@ -305,6 +305,7 @@ class Fit:
         the sensors are
     fit_percent : by run and channel
     residuals : by run and channel, (samples,) model, as the sensors read it, minus measured, SI
+    faults : those of the warnings because of which the outcome is DOUBTFUL
     offers : what would mend channels that are probably wrong
     cost_history : the best cost after each evaluation, as the noise then in force counts it
     starts : points that were tried as starts, the told one among them
@@ -322,6 +323,7 @@ class Fit:
     outcome: Outcome
     converged: bool
     warnings: tuple[str, ...]
+    faults: tuple[str, ...]
     offers: tuple[Offer, ...]
     seconds: float
     simulations: int

@@ -32,6 +32,7 @@ def fit_to_json(fit: Fit) -> dict[str, Any]:
             "outcome": str(fit.outcome),
             "converged": fit.converged,
             "warnings": list(fit.warnings),
+            "faults": list(fit.faults),
             "offers": [asdict(one) for one in fit.offers],
             "cost": fit.cost,
             "cost_history": list(fit.cost_history),

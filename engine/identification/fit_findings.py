@@ -1,19 +1,14 @@
-"""What a fit should tell about its runs: wrong signs and units, channels the model cannot follow.
-
-All functions compare one measured channel with what its sensor reads of the model and return a
-sentence that names run and channel, or None. The model at the start values is as telling as the
-fitted one: a fit to a record of the wrong sign bends the car until the two look alike.
+"""What a fit should tell about its runs, in sentences: wrong channels and those that the model
+cannot follow, outliers, other minima, and what the runs do not determine.
 """
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..simulation.channel_faults import NOISE_EXPLAINS, ChannelFaults, channel_faults
 from ..simulation.simulate import fit_percent
-from ..spikes import despiked
 from ..units import after_number, in_percent
 from .compared_runs import ComparedRun
 from .fit import CombinationEstimate, Estimate, FittedRun, Minimum, SensorEstimate
@@ -24,39 +19,8 @@ Array = NDArray[np.float64]
 Histories = Mapping[str, Mapping[str, Array]]
 """(samples,) by run and channel."""
 
-OPPOSITE = -0.5
-"""Correlation with the model below which a channel counts as turned over."""
-
-EXCHANGED = {
-    "chassis.pitch": ", unless it is the front and rear wheels whose columns are exchanged",
-    "chassis.roll": ", unless it is the left and right wheels whose columns are exchanged",
-}
-"""What turns a channel over as its own sign does."""
-
-ALIKE = 5.0
-"""Factor between measured and model amplitude up to which their signs are compared."""
-
-STANDING = {"chassis.z": 0.1, "chassis.pitch": 0.06, "chassis.roll": 0.06}
-"""Standard deviation (m, rad) beyond which a model has fallen over and is no witness."""
-
-LEAST_MOTION = 1e-4
-"""Share of it below which a model does not move: 10 um, or 0.3 thousandths of a degree."""
-
 POOR_FIT = 50.0
 """Fit percent below which a channel is reported, unless noise alone explains it."""
-
-NOISE_EXPLAINS = 2.0
-"""Residuals up to this many times the stated noise are noise."""
-
-DEGREES = 180.0 / math.pi
-
-UNIT_RATIOS = {
-    "chassis.z": ((1e3, 3.0, "mm", "m"), (1e-3, 3.0, "m", "mm")),
-    "chassis.pitch": ((DEGREES, 2.5, "deg", "rad"), (1 / DEGREES, 2.5, "rad", "deg")),
-    "chassis.roll": ((DEGREES, 2.5, "deg", "rad"), (1 / DEGREES, 2.5, "rad", "deg")),
-}
-"""By channel: the ratio of measured to model amplitude that a mistaken unit makes, the factor
-around it that counts, the unit of the numbers and the unit the header claims."""
 
 FEW_OUTLIERS, MANY_OUTLIERS = 0.005, 0.2
 """Shares of a channel beyond the loss's scale: from the first they are more than the noise's own
@@ -74,81 +38,38 @@ TOLD_APART = 0.9
 """Correlation from which an undetermined parameter is said to be confused with another."""
 
 
-@dataclass(frozen=True, slots=True)
-class Fault:
-    """What is probably wrong with a channel; `factor` of its readings, where that would mend it."""
-
-    sentence: str
-    factor: float | None = None
+def well_driven(runs: Sequence[ComparedRun]) -> list[ComparedRun]:
+    """Runs whose wheels and a_x are not in doubt; in the others every output would look wrong."""
+    return [seen for seen in runs if not seen.inputs.faults]
 
 
-@dataclass(frozen=True, slots=True)
-class ChannelFaults:
-    """All that is probably wrong with a run's channel; `beside` tells what else it may be."""
+def faults_of_channels(
+    runs: Sequence[ComparedRun], model: Histories, fitted: Histories | None = None
+) -> dict[tuple[str, str], ChannelFaults]:
+    """By run and channel, what is probably wrong; of well driven runs alone.
 
-    found: tuple[Fault, ...]
-    beside: list[str] = field(default_factory=list)
-
-    @property
-    def sentences(self) -> list[str]:
-        """Them all, for a person."""
-        return [*(one.sentence for one in self.found), *self.beside]
-
-
-def correlation(measured: Array, model: Array) -> float:
-    """Correlation of the two histories about their means; 0 when one of them never moves."""
-    one, other = measured - np.mean(measured), model - np.mean(model)
-    size = float(np.linalg.norm(one) * np.linalg.norm(other))
-    return float(one @ other) / size if size > 0.0 else 0.0
-
-
-def _amplitude_ratio(channel: str, measured: Array, model: Array) -> float:
-    """Measured over model amplitude; 0 for a model that never moves or has fallen over."""
-    of_measured, of_model = (float(np.std(despiked(one))) for one in (measured, model))
-    moves = LEAST_MOTION * STANDING[channel] < of_model < STANDING[channel]
-    return of_measured / of_model if moves else 0.0
-
-
-def wrong_sign(
-    run: str, channel: str, measured: Array, start: Array, fitted: Array
-) -> Fault | None:
-    """A channel that runs against the model, at the start values or after the fit.
-
-    A model that moves much more or less than the channel is no witness.
+    model : at the start values, where there is a fitted one
     """
-    for model, when in ((start, "at the start values"), (fitted, "after the fit")):
-        opposed = correlation(measured, model)
-        if opposed < OPPOSITE and 1.0 / ALIKE < _amplitude_ratio(channel, measured, model) < ALIKE:
-            return Fault(
-                f"{channel} of run {run} runs against the model (correlation {opposed:.2f} {when});"
-                f" its sign is probably wrong: multiply it by -1{EXCHANGED.get(channel, '')}.",
-                -1.0,
-            )
-    return None
+    return {
+        (seen.name, channel): found
+        for seen in well_driven(runs)
+        for channel, found in channel_faults(
+            seen.name,
+            seen.measured,
+            seen.noise,
+            model[seen.name],
+            None if fitted is None else fitted[seen.name],
+        ).items()
+    }
 
 
-def wrong_unit(run: str, channel: str, measured: Array, start: Array) -> Fault | None:
-    """A channel whose amplitude is a unit's factor away from the model's at the start values."""
-    ratio = _amplitude_ratio(channel, measured, start)
-    for expected, spread, numbers, header in UNIT_RATIOS[channel]:
-        if expected / spread < ratio < expected * spread:
-            return Fault(
-                f"{channel} of run {run} moves {ratio:.3g} times as much as the model; its numbers "
-                f"may be in {numbers} under a header that says {header}: correct the header.",
-                expected,
-            )
-    return None
-
-
-def dead_sensor(
-    run: str, channel: str, measured: Array, model: Array, noise: float
-) -> Fault | None:
-    """A channel that never moves although the model at the start values does, beyond its noise."""
-    if np.ptp(measured) > 0.0 or float(np.std(model)) <= NOISE_EXPLAINS * noise:
-        return None
-    return Fault(
-        f"{channel} of run {run} never moves while the model does; its sensor was probably dead: "
-        "leave the channel out."
+def fault_sentences(
+    runs: Sequence[ComparedRun], of_channels: Mapping[tuple[str, str], ChannelFaults]
+) -> tuple[str, ...]:
+    """All because of which the runs determine nothing: of what drives them, and of channels."""
+    return (
+        *(sentence for seen in runs for sentence in seen.inputs.faults),
+        *(sentence for found in of_channels.values() for sentence in found.sentences),
     )
 
 
@@ -162,30 +83,6 @@ def poor_fit(run: str, channel: str, measured: Array, fitted: Array, noise: floa
         f"The model follows {channel} of run {run} poorly (fit {percent:.0f} %); check the "
         "channel, the car's known data and the start values."
     )
-
-
-def channel_faults(
-    runs: Sequence[ComparedRun], start: Histories, fitted: Histories
-) -> dict[tuple[str, str], ChannelFaults]:
-    """By run and channel, a sign, unit or sensor that is probably wrong."""
-    found: dict[tuple[str, str], ChannelFaults] = {}
-    for seen in runs:
-        opposed = []
-        for channel, measured in seen.measured.items():
-            before, after = start[seen.name][channel], fitted[seen.name][channel]
-            sign = wrong_sign(seen.name, channel, measured, before, after)
-            unit = wrong_unit(seen.name, channel, measured, before)
-            opposed += [channel] if sign else []
-            dead = dead_sensor(seen.name, channel, measured, before, seen.noise[channel])
-            if sign or unit or dead:
-                faults = tuple(one for one in (sign, unit, dead) if one)
-                found[seen.name, channel] = ChannelFaults(faults)
-        if len(opposed) > 1:
-            found[seen.name, opposed[-1]].beside.append(
-                f"Since {' and '.join(opposed)} of run {seen.name} run against the model together, "
-                "it may rather be the wheel.*.z whose sign is wrong."
-            )
-    return found
 
 
 def poor_fits(runs: Sequence[ComparedRun], fitted: Histories) -> list[str]:

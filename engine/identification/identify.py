@@ -36,12 +36,14 @@ from .fit import (
 from .fit_findings import (
     Histories,
     bound_findings,
-    channel_faults,
+    fault_sentences,
+    faults_of_channels,
     hardly_moving,
     minima_findings,
     outlier_findings,
     poor_fits,
     undetermined_findings,
+    well_driven,
 )
 from .multistart import refined_starts, spread
 from .noise_rounds import with_found_noise
@@ -128,10 +130,9 @@ def identify(
     priors = prior_checks(residuals, solution, said)
     parameters, sensors = estimates(problem, solution.x, of_all, beyond=solution.beyond())
     fitted = residuals.model(solution.x)
-    driven = _well_driven(problem)
-    faults = channel_faults(driven, start, fitted)
-    wrong = bool(faults) or len(driven) < len(problem.runs)
-    outcome = Outcome.DOUBTFUL if wrong else _outcome(solution, parameters, sensors, residuals)
+    of_channels = faults_of_channels(problem.runs, start, fitted)
+    faults = fault_sentences(problem.runs, of_channels)
+    outcome = Outcome.DOUBTFUL if faults else _outcome(solution, parameters, sensors, residuals)
     converged = outcome in CONVERGED
     runs = tuple(_fitted_run(seen, residuals, r) for seen in problem.runs)
     minima = tuple(_minimum(ended, residuals) for ended in reached)
@@ -143,9 +144,9 @@ def identify(
     warnings = [
         *(warning for seen in problem.runs for warning in seen.inputs.warnings),
         *moved,
-        *(sentence for one in faults.values() for sentence in one.sentences),
+        *faults,
     ]
-    if not wrong:  # what else a wrong channel has bent is no news
+    if not faults:  # what else a wrong channel has bent is no news
         warnings += [
             *poor_fits(told, fitted),  # noise out of residuals explains any misfit
             *_swings(problem, fitted),
@@ -171,7 +172,8 @@ def identify(
         outcome=outcome,
         converged=converged,
         warnings=tuple(dict.fromkeys(warnings)),
-        offers=offers(problem, driven, faults),
+        faults=faults,
+        offers=offers(problem, well_driven(problem.runs), of_channels),
         seconds=time.perf_counter() - began,
         simulations=search.simulations,
         evaluations=search.evaluations,
@@ -238,16 +240,10 @@ def _swings(problem: Problem, fitted: Histories) -> list[str]:
     ]
 
 
-def _well_driven(problem: Problem) -> list[ComparedRun]:
-    """Runs whose wheels and a_x are not in doubt; in the others every output would look wrong."""
-    return [seen for seen in problem.runs if not seen.inputs.faults]
-
-
 def _in_doubt(residuals: Residuals, x: Array) -> bool:
     """Whether a channel is probably wrong, as the car at x sees it."""
-    runs, model = residuals.problem.runs, residuals.model(x)
-    driven = _well_driven(residuals.problem)
-    return len(driven) < len(runs) or bool(channel_faults(driven, model, model))
+    runs = residuals.problem.runs
+    return bool(fault_sentences(runs, faults_of_channels(runs, residuals.model(x))))
 
 
 def _failure(problem: Problem) -> str:

@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 
+from ..simulation.channel_faults import ChannelFaults
 from .compared_runs import ComparedRun
 from .fit import Offer
-from .fit_findings import ChannelFaults
 from .problem import Problem
 from .sensor_model import LARGEST_GAIN, SMALLEST_GAIN, SensorModel
 

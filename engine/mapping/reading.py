@@ -1,6 +1,7 @@
 """Measurement files under a mapping: from a path or from bytes to a Run."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from ..channels import Run
@@ -29,7 +30,8 @@ def read_recording(
     notes = read_notes(beside) if beside.is_file() else RunNotes()
     try:
         with opened(path, path.name) as table:
-            return mapped_run(table, mapping, {**notes.noise, **(noise or {})}, notes.description)
+            run = mapped_run(table, mapping, {**notes.noise, **(noise or {})}, notes.description)
+            return replace(run, vehicle=notes.vehicle or run.vehicle)
     except OSError as error:
         raise _unreadable(path, error) from error
 
@@ -62,12 +64,13 @@ def mapped_run(
 ) -> Run:
     """The run, with the notes that the file carries in itself where none lie beside it."""
     said = notes_in(table.comment)
-    return apply(
+    run = apply(
         mapping,
         table,
         noise={**said.noise, **noise},
         description=description or said.description,
     )
+    return replace(run, vehicle=said.vehicle)
 
 
 def _unreadable(path: Path, error: OSError) -> MeasurementError:

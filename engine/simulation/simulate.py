@@ -15,13 +15,15 @@ from numpy.typing import NDArray
 from ..channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
 from ..demand import Demand, PiecewiseLinear, PostMotion
 from ..errors import SimulationDiverged, SimulationError
-from ..filters import in_band, smoothed
+from ..filters import smoothed
 from ..frames import AXLES, CORNERS
 from ..manoeuvre import Manoeuvre
 from ..roads.road import Road
+from ..run_notes import DEFAULT_NOISE
 from ..vehicle import Vehicle
 from . import baseline
 from .car_rows import car_row
+from .channel_faults import channel_faults
 from .initial_state import swings_in
 from .integration import check_sound, free_outputs, free_states, rims_outputs, rims_states
 from .output_channels import (
@@ -39,6 +41,7 @@ from .stability import check_free_step, check_rims_step, stable_on_rims
 from .stepping import prepare_free
 
 Array = NDArray[np.float64]
+Outputs = Mapping[str, Array]
 Model = Literal["8dof", "7dof"]
 Traction = Literal["exact", "paper"]
 
@@ -64,6 +67,8 @@ class Simulation:
         model then pulls on the road (or, with lift-off, has left it)
     fit_percent : rims mode, per measured channel: 100 (1 - |y - y_hat| / |y - mean(y)|)
     steps : integration steps taken
+    faults : those of the warnings by which the recording is probably wrong, as an identification
+        would find it
     """
 
     mode: Literal["road", "rims", "posts"]
@@ -72,6 +77,7 @@ class Simulation:
     steps: int
     fit_percent: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
 
 
 def default_step(*cars: Vehicle) -> float:
@@ -177,13 +183,22 @@ def simulate_rims(
         result = replace(baseline.simulate_rims(vehicle, run.time, heights, points), name=run.name)
     else:
         result = _rims_run(vehicle, inputs, traction, points)
+    band = settings.output_band
+    recorded, followed = (filtered_outputs(one, band) for one in (run, result))
+    faults = inputs.faults
+    if model == "8dof" and not faults:  # which would make every output look wrong
+        faults = _channel_faults(run, recorded, followed)
+    warnings = [*inputs.warnings, *ignored, *faults]
+    if not inputs.stands:
+        warnings += _swing(run, recorded, followed, model, settings)
     return Simulation(
         "rims",
         result,
         _load_shares(result),
         inputs.node_time.size - 1,
-        _fit_percent(result, run, settings),
-        (*inputs.warnings, *ignored, *_swing(result, run, inputs, model, settings)),
+        _fit_percent(run, result, recorded, followed),
+        tuple(dict.fromkeys(warnings)),
+        faults,
     )
 
 
@@ -373,26 +388,33 @@ def _road_warnings(road: Road, vehicle: Vehicle, run: Run) -> tuple[str, ...]:
     return tuple(warnings)
 
 
-def _fit_percent(simulated: Run, measured: Run, settings: RimsSettings) -> dict[str, float]:
-    """Fit of every channel that was measured, simulated and not prescribed."""
+def _fit_percent(
+    measured: Run, simulated: Run, recorded: Outputs, followed: Outputs
+) -> dict[str, float]:
+    """Fit of every channel that was measured, simulated and not prescribed.
+
+    recorded, followed : their outputs as compared
+    """
     given = {*INPUT_CHANNELS, "chassis.v_x", "chassis.x"}
-    scores = {}
-    for name in measured.columns:
-        if name in simulated and name not in given:
-            band = settings.output_band if name in OUTPUT_CHANNELS else (None, None)
-            histories = (in_band(run.time, run[name], band) for run in (measured, simulated))
-            scores[name] = fit_percent(*histories)
-    return scores
+    return {
+        name: fit_percent(recorded.get(name, measured[name]), followed.get(name, simulated[name]))
+        for name in measured.columns
+        if name in simulated and name not in given
+    }
+
+
+def _channel_faults(run: Run, recorded: Outputs, followed: Outputs) -> tuple[str, ...]:
+    """What is probably wrong with the recorded outputs; gaps tell nothing."""
+    whole = {name: values for name, values in recorded.items() if np.isfinite(values).all()}
+    found = channel_faults(run.name, whole, {**DEFAULT_NOISE, **run.noise}, followed)
+    return tuple(sentence for one in found.values() for sentence in one.sentences)
 
 
 def _swing(
-    simulated: Run, measured: Run, inputs: RimsInputs, model: Model, settings: RimsSettings
+    measured: Run, recorded: Outputs, followed: Outputs, model: Model, settings: RimsSettings
 ) -> list[str]:
     """A sentence where the record starts away from the equilibrium in which the model starts."""
-    if inputs.stands:
-        return []
-    name, time, band = measured.name, measured.time, settings.output_band
-    recorded, followed = (filtered_outputs(run, band) for run in (measured, simulated))
+    name, time = measured.name, measured.time
     if model == "7dof":
         remedy = "begin the run at rest, as the 7-DOF model does"
         return swings_in(name, time, recorded, followed, remedy=remedy)

@@ -54,6 +54,21 @@ def test_advice_after_an_identification(engineer):
     assert (refused.status_code, refused.json()["field"]) == (422, "vehicle")
 
 
+def test_a_fit_to_a_turned_channel_gives_no_advice(engineer):
+    """Oracle: the fit's own words."""
+    lines = (SAMPLES / "twin/manoeuvre_2.csv").read_bytes()
+    run = engineer.upload(lines, "turned.csv").json()["id"]
+    steps = [{"kind": "scale", "channel": "chassis.z", "gain": -1}]
+    assert engineer.put(f"/measurements/{run}/conditioning", json={"steps": steps}).is_success
+    asked = {"runs": [run], "vehicle": PAPER, "free": ["K_F", "K_R"]}
+    job = engineer.post("/identifications", json=asked).json()
+    done = engineer.wait_for("identifications", job["id"])
+    reply = engineer.post("/advice", json={"identification": job["id"], "candidates": ["brake-54"]})
+    assert reply.status_code == 422
+    assert reply.json()["detail"] == " ".join(done["result"]["faults"])
+    assert "chassis.z of run turned.csv runs against the model" in reply.json()["detail"]
+
+
 @pytest.mark.parametrize(
     ("asked", "status", "said"),
     [

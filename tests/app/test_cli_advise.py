@@ -1,10 +1,12 @@
 """`ridetune advise` as a person meets it: report, JSON, refusals."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from ridetune.app.cli import main
+from ridetune.engine.measurement import read_run, write_run
 
 from .command_line import refused
 
@@ -45,6 +47,28 @@ def test_advice_after_a_fit_takes_its_values_and_what_was_free(folder, capsys):
 def test_from_a_vehicle_the_runs_are_fitted_first(folder, capsys):
     assert main(f"advise {TWIN[1]} --vehicle paper --candidates brake-54".split()) == 0
     assert capsys.readouterr().out.startswith("The fit converged")
+
+
+def test_a_turned_channel_is_refused_as_identify_names_it(folder, capsys):
+    """Oracle: the turn that was made. A fit to it has bent the car; one to another run has not."""
+    run = read_run(TWIN[0])
+    turned = replace(run, channels={**run.channels, "chassis.z": -run["chassis.z"]})
+    write_run(turned, "turned.csv")
+    free = "--free K_F K_R --bounds K_F=10000:40000 K_R=10000:40000"
+    assert main(f"identify turned.csv --vehicle paper {free} -o bent.json".split()) == 0
+    assert main(f"identify {TWIN[0]} --vehicle paper {free} -o right.json".split()) == 0
+    [named] = json.loads((folder / "bent.json").read_text())["faults"]
+    assert "chassis.z of run turned.csv runs against the model" in named
+    capsys.readouterr()
+    for vehicle in ("bent.json", "right.json"):
+        told = refused(capsys, *f"advise turned.csv --vehicle {vehicle}".split())
+        assert "chassis.z of run turned.csv runs against the model" in told
+        assert "multiply it by -1." in told
+    old = json.loads((folder / "bent.json").read_text())
+    del old["faults"]
+    (folder / "bent.json").write_text(json.dumps(old))
+    told = refused(capsys, *["advise", "turned.csv", "--vehicle", "bent.json"])
+    assert "a channel is probably wrong" in told
 
 
 def test_refusals_name_the_place(folder, capsys):

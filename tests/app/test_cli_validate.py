@@ -3,9 +3,11 @@
 import hashlib
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
+import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from ridetune.app.cli import main
@@ -47,6 +49,24 @@ def test_a_held_out_run_is_predicted_over_its_road(folder, capsys):
     assert re.search(r"manoeuvre_2\.csv \(held out\) +road \+ torque +8-DOF +96\.", printed.out)
     document = json.loads((folder / "r.json").read_text())
     fitted, held = document["runs"]
+    within = re.findall(
+        r"^manoeuvre_2\.csv \(held out\) +(?:rims|road \+ torque) +([. \d]+)$",
+        printed.out,
+        re.MULTILINE,
+    )
+    shares = [
+        [score["coverage"] for score in one["scores"].values()]
+        for one in held["predictions"]
+        if one["model"] == "8dof"
+    ]
+    told = [[float(one) for one in row.split()] for row in within]
+    assert_allclose(told, 100.0 * np.array(shares), rtol=0, atol=0.0501)
+    assert_allclose(shares, 0.95, atol=0.014)  # white noise, 4001 samples, four times
+    [heads] = re.findall(r"squat, deg of pitch.*", printed.out)
+    assert heads.split("  ")[-1].strip() == "7-DOF, road + torque"
+    [steps] = re.findall(r"^manoeuvre_2\.csv +(-[-. \d]+)$", printed.out, re.MULTILINE)
+    told = [held["squat"]["step"], *(one["squat"] for one in held["predictions"])]
+    assert_allclose([float(step) for step in steps.split()], np.degrees(told), atol=5e-4)
     assert held["manoeuvre"]["seed"] == 2
     for run in (fitted, held):
         assert [one["mode"] for one in run["predictions"]] == ["rims", "rims", "road", "road"]
@@ -83,6 +103,22 @@ def test_the_manoeuvre_beside_a_recording_is_taken_and_texts_stay_texts(folder):
     assert found["name"] == name
     assert found["manoeuvre"]["name"] == "</script><b>"
     assert {one["mode"] for one in found["predictions"]} == {"rims", "road"}
+
+
+def test_what_makes_a_held_out_run_tell_nothing_is_warned_of(folder, capsys):
+    """Oracle: the channel that was turned over, and the car that the notes name."""
+    run = read_run(TWIN[1])
+    turned = replace(run, channels={**run.channels, "chassis.z": -run["chassis.z"]})
+    write_run(turned, "turned.csv")
+    (folder / "turned.toml").write_text('vehicle = "BMW 320i"')
+    command = f"validate {TWIN[0]} --hold-out turned.csv --vehicle paper {QUICK} -o r.html"
+    assert main(f"{command} --json r.json".split()) == 0
+    printed = capsys.readouterr()
+    warnings = [line for line in printed.out.splitlines() if line.startswith("Warning: ")]
+    findings = json.loads((folder / "r.json").read_text())["runs"][1]["findings"]
+    assert warnings[-2:] == [f"Warning: {one}" for one in findings]
+    assert "another car, BMW 320i" in findings[0]
+    assert "chassis.z of run turned.csv runs against the model" in findings[1]
 
 
 @pytest.mark.parametrize(

@@ -58,6 +58,11 @@ def test_the_held_out_run_is_predicted_to_its_noise(engineer, runs, done):
     for one in held["predictions"]:
         if one["model"] == "8dof":
             assert one["scores"]["chassis.z"]["rms_error"] == pytest.approx(0.5e-3, rel=0.045)
+            assert one["scores"]["chassis.z"]["coverage"] == pytest.approx(0.95, abs=0.014)
+            low, middle, high = (
+                one["values"][f"chassis.z{end}"] for end in (".lower", "", ".upper")
+            )
+            assert all(a <= b <= c for a, b, c in zip(low, middle, high, strict=True))
     shown = done["result"]["runs"][1]["predictions"]
     assert [one["scores"] for one in shown] == [one["scores"] for one in held["predictions"]]
     assert len(document["made"]["recordings"]) == 2
@@ -77,6 +82,27 @@ def test_what_is_kept_with_a_run_is_driven_unless_the_request_tells_otherwise(
         assert job["manoeuvres"] == driven
         engineer.post(f"/validations/{job['id']}/cancel")
     engineer.delete(path)
+
+
+def test_what_says_little_of_the_car_and_what_is_left_out_is_told(engineer, runs, fitted):
+    """Oracle: notes that name another car, and the recordings of the session."""
+    notes = b'vehicle = "BMW 320i"'
+    noted = engineer.put(f"/measurements/{runs[1]}/notes?name=n.toml", content=notes)
+    assert noted.json()["vehicle"] == "BMW 320i"
+    steps = [{"kind": "scale", "channel": "chassis.z", "gain": 2}]
+    for done in (steps, []):  # it stays known whatever is done to the recording
+        path = f"/measurements/{runs[1]}/conditioning"
+        assert engineer.put(path, json={"steps": done}).json()["measurement"]["vehicle"]
+    job = engineer.post("/validations", json={"identification": fitted, "hold_out": runs[1:]})
+    done = engineer.wait_for("validations", job.json()["id"])
+    assert [run["findings"] == [] for run in done["result"]["runs"]] == [True, False]
+    [finding] = done["result"]["runs"][1]["findings"]
+    assert "recorded with another car, BMW 320i" in finding
+    document = engineer.get(f"/validations/{done['id']}/result.json").json()
+    names = {one["name"]: one for one in engineer.get("/measurements").json()}
+    held = {"manoeuvre_1.csv", "manoeuvre_2.csv"}
+    assert set(document["made"]["left_out"]) == names.keys() - held
+    assert names["detailed_manoeuvre_1.csv"]["vehicle"] == "compact rear-drive car"
 
 
 def test_the_report_is_served_in_a_sandbox(engineer, done):

@@ -6,7 +6,7 @@ import re
 import pytest
 from ridetune.app.cli import main
 
-from .conftest import SAMPLES
+from .conftest import SAMPLES, add_file
 from .cut_off import cut_off
 
 pytestmark = pytest.mark.browser
@@ -98,6 +98,10 @@ def test_the_fitted_car_is_validated_on_the_page(visitor):
         == "10.00"
     )
     assert visitor.element("#validation .validation-scores tbody").count() == 2
+    # Both samples' roads are known: each is predicted from its rims and over its road.
+    assert visitor.element("#validation .coverage tbody tr").count() == 2 * 2
+    figures = visitor.element("#validation figcaption")
+    assert figures.filter(has_text="95 % error band").count() == 2 * 2 * 3
     assert cut_off(visitor) == []
     with visitor.page.context.expect_page() as opened:
         visitor.click("#report")
@@ -107,3 +111,42 @@ def test_the_fitted_car_is_validated_on_the_page(visitor):
     report.wait_for_selector("html[data-drawn=yes]", state="attached")
     assert report.locator(".figure").count() == inked(report)
     assert complaints == []
+
+
+def test_only_runs_of_the_fitted_car_that_are_not_left_out_are_held_out(visitor):
+    """Oracle: the cars that the samples' notes and the fit name, and the use that was chosen."""
+    visitor.click("#tab-measurements")
+    add_file(visitor, "paper.json", (SAMPLES / "twin/vehicle.json").read_bytes())
+    visitor.until("ridetune.state('vehicle').name === 'Reference car of the paper'")
+    for count, number in ((3, 1), (4, 2)):
+        name = f"manoeuvre_{number}.csv"
+        add_file(visitor, name, (SAMPLES / "twin" / name).read_bytes())
+        visitor.until(f"ridetune.state('measurements').length === {count}")
+    visitor.click("#tab-identification")
+    use = visitor.page.get_by_label
+    use("Use of manoeuvre_1.csv").select_option("fit")
+    use("Use of detailed_manoeuvre_1.csv").select_option("leave out")  # the ride on show
+    visitor.click("#start")
+    visitor.until("ridetune.state('fitJob') !== null", PRESSED)
+    visitor.click("#tab-validation")
+    panel = visitor.element("#validation")
+    assert panel.inner_text().count("Recorded with another car: compact rear-drive car.") == 2
+
+    def held():
+        rows = panel.get_by_role("checkbox").all()
+        return [row.get_attribute("aria-label") for row in rows if row.is_checked()]
+
+    assert held() == ["Hold out manoeuvre_2.csv"]
+    visitor.click("#tab-identification")
+    visitor.page.get_by_role("button", name="Set-up").click()
+    use("Use of manoeuvre_2.csv").select_option("leave out")
+    visitor.click("#tab-validation")
+    assert held() == []
+    visitor.page.get_by_label("Hold out detailed_manoeuvre_1.csv").check()
+    visitor.click("#validate")
+    visitor.until("ridetune.validation() && ridetune.validation().state === 'done'", PRESSED)
+    visitor.wait(lambda: visitor.element("#report").count() == 1, "a link to the report")
+    said = "Neither fitted nor held out: detailed_manoeuvre_2.csv, manoeuvre_2.csv."
+    assert said in panel.inner_text()
+    finding = panel.locator(".validation-scores .doubt").inner_text()
+    assert "was recorded with another car, compact rear-drive car, than the one" in finding

@@ -18,9 +18,10 @@ from ridetune.engine.toml_text import LARGEST_FILE
 
 def test_notes_state_noise_and_description():
     notes = parse_notes(
-        b'description = "Monday"\nvehicle = "car.json"\n[noise]\n"chassis.z" = 0.0005\n', "r.toml"
+        b'description = "Monday"\nvehicle = "Escort"\n[noise]\n"chassis.z" = 0.0005\n', "r.toml"
     )
     assert notes.description == "Monday"
+    assert notes.vehicle == "Escort"
     assert notes.noise == {"chassis.z": 0.0005}
 
 
@@ -46,6 +47,7 @@ def test_empty_notes_state_nothing():
         (b"[nosie]\na = 1", "r.toml: nosie is not known; did you mean noise?"),
         (b"noise = 3", "r.toml: noise must be a table"),
         (b"description = 3", "r.toml: description must be a text"),
+        (b"vehicle = 3", "r.toml: vehicle must be a text"),
         (b'[noise]\n"chassis.zz" = 1', "did you mean chassis.z?"),
         (b'[noise]\n"chassis.z" = -1', "noise of chassis.z is -1; give a positive number in m"),
         (b'[noise]\n"chassis.z" = 1' + b"0" * 400, "noise of chassis.z is 1000"),
@@ -111,7 +113,9 @@ def test_what_conditioning_did_goes_into_notes_and_back():
         ("It drifts.",),
     )
     run = Run("r", [0.0, 1.0], {"chassis.z": [0.0, 1.0]}, {"chassis.z": 1e-4}, (), 'a "b"')
-    notes = parse_notes(notes_of(replace(run, conditioning=(record,) * 2)).encode(), "r.toml")
+    done = replace(run, conditioning=(record,) * 2, vehicle="Escort")
+    notes = parse_notes(notes_of(done).encode(), "r.toml")
+    assert notes.vehicle == "Escort"
     assert notes.conditioning == (record, record)
     assert (notes.noise, notes.description) == ({"chassis.z": 1e-4}, 'a "b"')
 

@@ -18,7 +18,8 @@ from ridetune.engine.parameters import ALL_NAMES, DAMPER_NAMES, PARAMETER_NAMES,
 from ridetune.engine.run_notes import DEFAULT_NOISE
 from ridetune.engine.simulation.rims_settings import RimsSettings
 from ridetune.engine.simulation.simulate import rims_batch, simulate_rims
-from ridetune.engine.validation import Case, validate
+from ridetune.engine.validation.cases import Case
+from ridetune.engine.validation.validate import validate
 from ridetune.engine.vehicle_file import read_vehicle
 from scipy.stats import chi2
 

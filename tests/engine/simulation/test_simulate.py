@@ -9,6 +9,8 @@ from ridetune.engine.channels import Run
 from ridetune.engine.curves import smooth_step
 from ridetune.engine.errors import RoadError, SimulationDiverged, SimulationError
 from ridetune.engine.frames import AXLES, CORNERS, GRAVITY
+from ridetune.engine.identification.identify import identify
+from ridetune.engine.identification.problem import Problem
 from ridetune.engine.manoeuvre import manoeuvre_from_json, reference_manoeuvres
 from ridetune.engine.roads.road import Road
 from ridetune.engine.simulation.car_rows import car_row, car_rows
@@ -354,3 +356,32 @@ def test_rims_fed_back_reproduce_the_chassis(car, driven):
     assert min(fit[name] for name in ("chassis.z", "chassis.pitch", "chassis.roll")) > 99.9
     assert min(fit[f"suspension.{corner}.travel"] for corner in CORNERS) > 99.9
     assert min(fit[f"tyre.{corner}.load"] for corner in CORNERS) > 95.0
+
+
+@pytest.mark.parametrize("channel", ["chassis.z", "chassis.pitch"])
+def test_a_turned_channel_is_told_as_an_identification_tells_it(car, driven, channel):
+    """Oracle: the turn that was made, and the identification's own words for the same recording."""
+    turned = replace(driven, channels={**driven.channels, channel: -driven[channel]})
+    found = simulate_rims(car, turned)
+    [sentence] = found.faults
+    assert sentence in found.warnings
+    assert f"{channel} of run {driven.name} runs against the model" in sentence
+    fit = identify(Problem.build(car, [turned], free=["K_F"]), most_evaluations=1)
+    assert fit.faults == (sentence.replace(")", " at the start values)", 1),)
+    assert simulate_rims(car, driven).faults == ()
+
+
+def test_a_turned_input_accuses_no_output(car, driven):
+    """Oracle: the turn that was made; dive and squat change places by it."""
+    turned = replace(driven, channels={**driven.channels, "chassis.a_x": -driven["chassis.a_x"]})
+    found = simulate_rims(car, turned)
+    [sentence] = found.faults
+    assert "chassis.a_x runs against the change of chassis.v_x" in sentence
+    assert sentence in simulate_rims(car, turned, model="7dof").faults
+
+
+def test_gaps_in_an_output_are_no_fault(car, driven):
+    gaps = replace(
+        driven, channels={**driven.channels, "chassis.z": np.full(driven.time.size, np.nan)}
+    )
+    assert simulate_rims(car, gaps).faults == ()

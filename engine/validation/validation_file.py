@@ -11,13 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .channels import OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
-from .frames import CORNERS
-from .identification.fit_file import plain
-from .manoeuvre import manoeuvre_to_json
-from .roads.iso8608 import CLASSES, REFERENCE_FREQUENCY
-from .roads.road_spectrum import RoadSpectrum
-from .validation import Geometry, Prediction, Score, ValidatedRun, Validation
+from ..channels import OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
+from ..frames import CORNERS
+from ..identification.fit_file import plain
+from ..manoeuvre import manoeuvre_to_json
+from ..roads.iso8608 import CLASSES, REFERENCE_FREQUENCY
+from ..roads.road_spectrum import RoadSpectrum
+from .geometry import Geometry
+from .prediction import Prediction, Score
+from .validate import ValidatedRun, Validation
 
 MOST_SAMPLES = 4001
 
@@ -61,6 +63,7 @@ def _run(run: ValidatedRun) -> dict[str, Any]:
     return {
         "name": run.name,
         "role": run.role,
+        "findings": list(run.findings),
         "samples": run.measured.time.size,
         "duration": run.measured.duration,
         "manoeuvre": None if run.manoeuvre is None else manoeuvre_to_json(run.manoeuvre),
@@ -82,7 +85,18 @@ def _prediction(one: Prediction, every: int) -> dict[str, Any]:
         "squat": one.squat,
         "warnings": list(one.warnings),
         "failure": one.failure,
-        "values": {} if one.run is None else _histories(one.run, PREDICTED, every),
+        "values": {} if one.run is None else _predicted(one.run, one.half_width, every),
+    }
+
+
+def _predicted(
+    run: Run, half_width: Mapping[str, NDArray[np.float64]], every: int
+) -> dict[str, list[float]]:
+    """What is kept of a prediction, with the ends of its bands as X.lower and X.upper."""
+    return _histories(run, PREDICTED, every) | {
+        f"{name}.{end}": _digits((run[name] + sign * width)[::every])
+        for name, width in half_width.items()
+        for end, sign in (("lower", -1.0), ("upper", 1.0))
     }
 
 
@@ -91,6 +105,7 @@ def _score(score: Score) -> dict[str, Any]:
     return {
         "fit_percent": score.fit_percent,
         "rms_error": score.rms_error,
+        "coverage": score.coverage,
         "rating": None if rating is None else {"overall": rating.overall, **asdict(rating)},
     }
 

@@ -7,25 +7,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.engine.channels import OUTPUT_CHANNELS, Run
-from ridetune.engine.errors import Cancelled, ManoeuvreError, ProblemError, VehicleError
+from ridetune.engine.channels import OUTPUT_CHANNELS
+from ridetune.engine.errors import Cancelled, ManoeuvreError, ProblemError
 from ridetune.engine.manoeuvre import reference_manoeuvres
 from ridetune.engine.measurement import read_run
 from ridetune.engine.run_notes import DEFAULT_NOISE
+from ridetune.engine.simulation.simulate import simulate_rims
 from ridetune.engine.torque_laws import Deceleration
-from ridetune.engine.validation import (
-    Case,
-    Geometry,
-    check_cases,
-    geometry_from_json,
-    squat_window,
-    validate,
-)
-from ridetune.engine.validation_file import MOST_SAMPLES, validation_to_json
+from ridetune.engine.validation.cases import Case, check_cases
+from ridetune.engine.validation.geometry import Geometry
+from ridetune.engine.validation.validate import validate
+from ridetune.engine.validation.validation_file import MOST_SAMPLES, validation_to_json
 from ridetune.engine.vehicle import Pivot
 from ridetune.engine.vehicle_file import reference_vehicles
 
-FOLDER = Path(__file__).parents[2] / "sample_runs"
+FOLDER = Path(__file__).parents[3] / "sample_runs"
 PAPER = reference_vehicles()["paper"]
 
 
@@ -74,25 +70,6 @@ def test_only_the_trailing_arms_squat(validation):
     assert abs(prediction(run, "road", "7dof").squat) < np.radians(0.05)
 
 
-def test_the_squat_is_read_late_in_the_push_and_long_before_it():
-    """Oracle: Manoeuvre 2 pushes from 5 to 10 s; a_x is read below 1 Hz, hence 0.2 s."""
-    window = squat_window(twin(2).run)
-    assert_allclose(window.late, (7.5, 10.0), atol=0.2)
-    assert_allclose(window.rest, (2.5, 4.5), atol=0.2)
-    still = Run("still", np.arange(100) * 0.01, {"chassis.pitch": np.zeros(100)})
-    assert squat_window(still) is None
-
-
-def test_the_squat_of_two_pushes_is_that_of_the_longer():
-    """Oracle: 2 m/s2 from 5 to 9 s, and again from 20 to 22 s; read below 1 Hz, hence 0.2 s."""
-    time = np.arange(3000) * 0.01
-    push = 2.0 * (((time > 5.0) & (time < 9.0)) | ((time > 20.0) & (time < 22.0)))
-    run = Run("two", time, {"chassis.a_x": push, "chassis.pitch": np.zeros(3000)})
-    window = squat_window(run)
-    assert_allclose(window.late, (7.0, 9.0), atol=0.2)
-    assert_allclose(window.rest, (2.5, 4.5), atol=0.2)
-
-
 def test_the_road_of_a_known_manoeuvre_is_shown_class_by_class(validation):
     first, second = validation.runs[1].road
     assert first.begin == pytest.approx(PAPER.front.cg_distance)
@@ -117,6 +94,20 @@ def test_a_recording_sampled_otherwise_is_predicted_at_its_own_times():
     found = validate(PAPER, [replace(case, run=thin)]).runs[0]
     score = prediction(found, "road", "8dof").scores["chassis.z"]
     assert_allclose(score.rms_error, DEFAULT_NOISE["chassis.z"], rtol=0.08)
+
+
+def test_a_turned_channel_and_another_car_are_told_beside_the_run():
+    """Oracle: what was done to the run, and the words of a simulation on its rims."""
+    case = twin(2, "hold-out", known=False)
+    channels = case.run.channels | {"chassis.pitch": -case.run["chassis.pitch"]}
+    turned = replace(case, run=replace(case.run, channels=channels, vehicle="BMW 320i"))
+    right, wrong = validate(PAPER, [twin(1, known=False), turned]).runs
+    assert right.findings == ()
+    other, fault = wrong.findings
+    assert "recorded with another car, BMW 320i, than the one" in other
+    assert simulate_rims(PAPER, turned.run).faults == (fault,)
+    assert "chassis.pitch of run manoeuvre_2.csv runs against the model" in fault
+    assert prediction(wrong, "rims", "8dof").scores["chassis.pitch"].fit_percent < 0.0
 
 
 def test_without_a_manoeuvre_there_are_only_the_rims():
@@ -178,22 +169,6 @@ def test_cases_that_mean_nothing_are_refused():
     ):
         with pytest.raises(error, match=sentence):
             check_cases(cases)
-
-
-def test_geometry_is_read_strictly():
-    read = geometry_from_json({"rear": {"distance": 1.1, "angle": 0.17}})
-    assert read == Geometry(rear=Pivot(1.1, 0.17))
-    assert read.values() == {"rear.pivot.distance": 1.1, "rear.pivot.angle": 0.17}
-    for data, sentence in (
-        ([], "must be an object"),
-        ({}, "holds no pivot"),
-        ({"frunt": {"distance": 1, "angle": 0}}, 'did you mean "front"'),
-        ({"front": {"distance": 1, "angel": 0}}, 'did you mean "angle"'),
-        ({"front": {"distance": 1}}, "front.angle is missing"),
-        ({"front": {"distance": 0, "angle": 0}}, "front.distance is 0"),
-    ):
-        with pytest.raises(VehicleError, match=sentence):
-            geometry_from_json(data)
 
 
 def test_the_document_is_plain_json_and_bounded(validation):
