@@ -36,7 +36,8 @@ def _rims() -> None:
     """One car and a batch on rims that stand still."""
     import numpy as np
 
-    from ..engine.channels import INPUT_CHANNELS, Run
+    from ..engine.channels import INPUT_CHANNELS
+    from ..engine.run import Run
     from ..engine.simulation.car_rows import car_row
     from ..engine.simulation.rims import prepare
     from ..engine.simulation.simulate import rims_batch, simulate_rims

@@ -8,9 +8,9 @@ from dataclasses import replace
 from difflib import get_close_matches
 from typing import Literal
 
-from ..engine.channels import Run
 from ..engine.manoeuvre import Manoeuvre, manoeuvre_from_json, reference_manoeuvres
 from ..engine.roads.road_specs import road_spec_from_json
+from ..engine.run import Run
 from ..engine.simulation.excitation import Excitation, FreeExcitation, RimsExcitation
 from ..engine.simulation.recorded_motion import RecordedMotion, recorded_motion
 from ..engine.simulation.simulate import SAMPLE_STEP, default_step

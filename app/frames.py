@@ -19,7 +19,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..engine.channels import Run, channel
+from ..engine.channels import channel
+from ..engine.run import Run
 from .errors import NotAcceptable
 
 Decimate = Literal["extremes", "stride"]

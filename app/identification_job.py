@@ -7,8 +7,8 @@ database nor the data directory and may be another machine.
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..engine.channels import Run
 from ..engine.parameters import ALL_NAMES, PARAMETER_NAMES, parameter
+from ..engine.run import Run
 from .errors import Conflict, OverBudget
 from .job_store import Job
 from .jobs import Kind, digest

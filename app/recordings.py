@@ -18,9 +18,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..engine.channels import Run, channel
+from ..engine.channels import channel
 from ..engine.errors import MeasurementError, UnmappedError
 from ..engine.remembered import Remembered
+from ..engine.run import Run
 from ..engine.run_notes import doubtful_noise
 from ..engine.simulation.rims_settings import RimsSettings
 from ..engine.step_record import step_records_from_json

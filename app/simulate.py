@@ -9,9 +9,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from ..engine.channels import Run, channel
+from ..engine.channels import channel
 from ..engine.identification.bands import Bands, bands
 from ..engine.identification.kept_fit import fit_from_json
+from ..engine.run import Run
 from ..engine.simulation.excitation import Excitation
 from ..engine.simulation.metrics import Metric, metrics
 from ..engine.vehicle import Vehicle

@@ -8,10 +8,10 @@ from dataclasses import asdict, dataclass
 from typing import Any
 from zlib import crc32
 
-from .channels import Run
 from .errors import CampaignError, Cancelled, RideError
 from .manoeuvre import ORDER, Manoeuvre, reference_manoeuvres
 from .plant import Asked, ConceptPlant, Plant, Told
+from .run import Run
 from .sensor_file import check_sensors, noisy
 from .sensors import SensorSet, measured
 from .vehicle import Vehicle

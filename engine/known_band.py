@@ -1,6 +1,7 @@
 """From which frequency on a conditioned run knows what drives the model and what is compared."""
 
-from .channels import OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
+from .channels import OUTPUT_CHANNELS, WHEEL_CHANNELS
+from .run import Run
 
 TIMES_LOWEST = 2.0
 """What is in a band counts from so many times its lowest frequency on: 1/65 is missing there."""

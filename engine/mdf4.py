@@ -4,9 +4,10 @@ import io
 from collections.abc import Mapping
 from datetime import datetime
 
-from .channels import Run, channel
+from .channels import channel
 from .formats.readers import require_package
 from .measurement import in_unit
+from .run import Run
 
 
 def run_to_mdf4(

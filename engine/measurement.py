@@ -20,7 +20,6 @@ from .channels import (
     INPUT_CHANNELS,
     OUTPUT_CHANNELS,
     ChannelInfo,
-    Run,
     channel,
     find_channel,
 )
@@ -37,6 +36,7 @@ from .plausibility import (
     require_increasing,
     require_samples,
 )
+from .run import Run
 from .run_notes import (
     RunNotes,
     checked_noise,

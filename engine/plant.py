@@ -8,9 +8,10 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
-from .channels import CHANNELS, RAW_CHANNELS, Run
+from .channels import CHANNELS, RAW_CHANNELS
 from .errors import SimulationDiverged
 from .manoeuvre import Manoeuvre
+from .run import Run
 from .simulation.output_channels import DEFAULT_POINTS, Points
 from .simulation.simulate import FREE_STEP, simulate_road
 from .vehicle import Vehicle

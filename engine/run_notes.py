@@ -23,8 +23,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .channels import Run, channel, find_channel
+from .channels import channel, find_channel
 from .errors import MeasurementError
+from .run import Run
 from .short_file import read_short
 from .step_record import StepRecord, step_record_to_json, step_records_from_json
 from .toml_text import LARGEST_FILE, parse_toml, toml_table, toml_value

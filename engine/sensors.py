@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
-from .channels import CHANNELS, Run, channel
+from .channels import CHANNELS, channel
 from .frames import CORNERS
+from .run import Run
 from .units import to_si
 from .vehicle import Range
 

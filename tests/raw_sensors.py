@@ -5,9 +5,9 @@ what is tested.
 """
 
 import numpy as np
-from ridetune.engine.channels import Run
 from ridetune.engine.frames import CORNERS
 from ridetune.engine.manoeuvre import reference_manoeuvres
+from ridetune.engine.run import Run
 from ridetune.engine.simulation.simulate import simulate_road
 from scipy.interpolate import CubicSpline
 

@@ -7,10 +7,11 @@ is the oracle.
 """
 
 import numpy as np
-from ridetune.engine.channels import INPUT_CHANNELS, OUTPUT_CHANNELS, Run
+from ridetune.engine.channels import INPUT_CHANNELS, OUTPUT_CHANNELS
 from ridetune.engine.kernels.buffer import BODY_ROWS
 from ridetune.engine.kernels.records import Body, Corner
 from ridetune.engine.parameters import PARAMETER_NAMES
+from ridetune.engine.run import Run
 from ridetune.engine.run_notes import DEFAULT_NOISE
 
 from .factories import paper_vehicle

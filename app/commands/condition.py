@@ -5,13 +5,13 @@ import sys
 from argparse import Namespace
 from pathlib import Path
 
-from ...engine.channels import Run
 from ...engine.conditioning.chain import condition as after
 from ...engine.conditioning.chain import read_steps, steps_to_json
 from ...engine.conditioning.suggestion import Suggestion, suggest
 from ...engine.errors import MeasurementError
 from ...engine.known_band import output_highpass
 from ...engine.measurement import missing_for_identification, run_to_csv
+from ...engine.run import Run
 from ...engine.run_notes import notes_beside, notes_of, read_notes
 from .arguments import ArgumentError
 from .inputs import find_mapping, find_vehicle, read_one, recording_files

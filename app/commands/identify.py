@@ -6,13 +6,13 @@ import sys
 from argparse import Namespace
 from collections.abc import Sequence
 
-from ...engine.channels import Run
 from ...engine.identification.fit import Fit, Progress, Stage
 from ...engine.identification.fit_file import fit_to_json, profile_to_json
 from ...engine.identification.identify import identify as fit_to_runs
 from ...engine.identification.problem import Problem
 from ...engine.identification.profile import Profile, profile, require_free
 from ...engine.parameters import DAMPER_NAMES, PARAMETER_NAMES, parameter
+from ...engine.run import Run
 from ...engine.vehicle import Vehicle
 from ..time_left import SearchClock
 from .arguments import bounds, loss, priors, rims_settings, sensors, whole

@@ -6,7 +6,6 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import TypeVar
 
-from ...engine.channels import Run
 from ...engine.errors import (
     ManoeuvreError,
     MeasurementError,
@@ -17,6 +16,7 @@ from ...engine.errors import (
 from ...engine.manoeuvre import Manoeuvre, read_manoeuvre, reference_manoeuvres
 from ...engine.mapping.mapping import ChannelMapping, read_mapping
 from ...engine.mapping.reading import read_recording
+from ...engine.run import Run
 from ...engine.run_notes import notes_beside, read_notes
 from ...engine.vehicle import Vehicle
 from ...engine.vehicle_file import read_vehicle, reference_vehicles

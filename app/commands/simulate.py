@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ...engine.channels import Run
 from ...engine.errors import SimulationError
 from ...engine.identification.bands import Bands, bands
 from ...engine.identification.kept_fit import KeptFit, read_fit
 from ...engine.measurement import run_to_csv
+from ...engine.run import Run
 from ...engine.simulation.metrics import metrics
 from .excitation import doubts, excitation, files_read, mode_of
 from .inputs import find_vehicle

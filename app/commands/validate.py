@@ -9,12 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ...engine.channels import Run
 from ...engine.errors import VehicleError
 from ...engine.identification.fit_file import fit_to_json
 from ...engine.identification.kept_fit import fit_from_json
 from ...engine.json_text import read_json
 from ...engine.manoeuvre import Manoeuvre, read_manoeuvre
+from ...engine.run import Run
 from ...engine.run_notes import manoeuvre_beside
 from ...engine.validation.cases import Case, as_it_moved, check_cases
 from ...engine.validation.geometry import Geometry, geometry_from_json

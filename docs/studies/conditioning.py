@@ -13,11 +13,11 @@ from importlib import import_module
 from pathlib import Path
 
 import numpy as np
-from ridetune.engine.channels import Run
 from ridetune.engine.conditioning.chain import condition
 from ridetune.engine.conditioning.suggestion import suggest
 from ridetune.engine.filters import in_band
 from ridetune.engine.identification.identify import Problem, identify
+from ridetune.engine.run import Run
 from ridetune.engine.simulation.rims_settings import RimsSettings
 from ridetune.engine.vehicle import Vehicle
 from ridetune.engine.vehicle_file import reference_vehicles

@@ -11,12 +11,13 @@ seen, by damper and bounds. Pivots: by the runs that are fitted, beside those of
 from pathlib import Path
 
 import numpy as np
-from ridetune.engine.channels import OUTPUT_CHANNELS, Run
+from ridetune.engine.channels import OUTPUT_CHANNELS
 from ridetune.engine.identification.fit import Fit
 from ridetune.engine.identification.identify import Problem, identify
 from ridetune.engine.identification.residuals import Residuals
 from ridetune.engine.measurement import read_run
 from ridetune.engine.parameters import ALL_NAMES, PARAMETER_NAMES, parameter
+from ridetune.engine.run import Run
 from ridetune.engine.simulation.simulate import rims_batch, simulate_rims
 from ridetune.engine.vehicle import Vehicle
 from ridetune.engine.vehicle_file import read_vehicle

@@ -10,12 +10,13 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from ridetune.engine.campaign import Campaign, chosen, roughened
-from ridetune.engine.channels import OUTPUT_CHANNELS, Run
+from ridetune.engine.channels import OUTPUT_CHANNELS
 from ridetune.engine.detailed.car_file import reference_car
 from ridetune.engine.detailed.plant import DetailedPlant
 from ridetune.engine.detailed.records import BushingLaw, DetailedCar, Strut
 from ridetune.engine.identification.identify import Problem, identify
 from ridetune.engine.parameters import ALL_NAMES, PARAMETER_NAMES
+from ridetune.engine.run import Run
 from ridetune.engine.sensors import SensorSet
 from ridetune.engine.simulation.simulate import simulate_rims
 

@@ -11,9 +11,9 @@ from dataclasses import replace
 
 from ridetune.engine import filters
 from ridetune.engine.campaign import TABLE_2
-from ridetune.engine.channels import Run
 from ridetune.engine.identification.identify import Problem, identify
 from ridetune.engine.manoeuvre import reference_manoeuvres
+from ridetune.engine.run import Run
 from ridetune.engine.sensors import RECORDED
 from ridetune.engine.simulation.rims_settings import RimsSettings
 from ridetune.engine.simulation.simulate import simulate_road

@@ -9,10 +9,11 @@ channels alone, sampled every 5 ms and every 1 ms. Prints the table of docs/iden
 from dataclasses import replace
 
 import numpy as np
-from ridetune.engine.channels import WHEEL_CHANNELS, Run
+from ridetune.engine.channels import WHEEL_CHANNELS
 from ridetune.engine.identification.identify import Problem, identify
 from ridetune.engine.manoeuvre import reference_manoeuvres
 from ridetune.engine.parameters import PARAMETERS
+from ridetune.engine.run import Run
 from ridetune.engine.sensors import RECORDED
 from ridetune.engine.simulation.rims_settings import RimsSettings
 from ridetune.engine.simulation.simulate import simulate_road

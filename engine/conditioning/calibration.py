@@ -7,9 +7,10 @@ from typing import Annotated, ClassVar
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from ..channels import CHANNELS, Run, channel
+from ..channels import CHANNELS, channel
 from ..errors import ConditioningError
 from ..frames import CORNERS, GRAVITY
+from ..run import Run
 from ..vehicle import Range, Vehicle
 from .done import Array, Done, history
 

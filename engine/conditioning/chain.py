@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..channels import Run
 from ..errors import ConditioningError, MeasurementError
 from ..json_record import RecordReader, record_to_json
 from ..json_text import read_json
+from ..run import Run
 from ..step_record import StepRecord
 from ..vehicle import Vehicle
 from .calibration import Rest, Scale

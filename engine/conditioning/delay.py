@@ -20,10 +20,10 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.signal import windows
 
-from ..channels import Run
 from ..errors import ConditioningError
 from ..filters import in_band
 from ..plausibility import FEWEST_SAMPLES
+from ..run import Run
 from ..vehicle import Range, Vehicle
 from .done import Array, Done, history, require_band, require_even
 

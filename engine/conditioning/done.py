@@ -6,9 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import Run, channel
+from ..channels import channel
 from ..errors import ConditioningError
 from ..filters import PAD_PERIODS, is_uniform, resolved, too_coarse
+from ..run import Run
 
 Array = NDArray[np.float64]
 Band = tuple[float | None, float | None]

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, get_args
 
-from ..channels import Run
+from ..run import Run
 from .chain import Step
 from .suggestion import RATE
 

@@ -18,9 +18,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from ..channels import Run
 from ..filters import is_uniform, low_pass, resolved, slow_part, too_coarse
 from ..frames import GRAVITY
+from ..run import Run
 from .calibration import QUIET, speeds
 from .delay import FEWEST_FREQUENCIES, MOST_OF_RECORD, Lag, find_lag, moves
 from .done import Array, history, history_or

@@ -22,10 +22,10 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from ..channels import Run
 from ..errors import ConditioningError
 from ..filters import in_band, low_pass, slow_part
 from ..frames import CORNERS, GRAVITY
+from ..run import Run
 from ..vehicle import Range, Vehicle
 from .done import (
     Array,

@@ -21,9 +21,10 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from ..channels import OUTPUT_CHANNELS, Run
+from ..channels import OUTPUT_CHANNELS
 from ..errors import ConditioningError
 from ..frames import CORNERS, Corner, side_of
+from ..run import Run
 from ..vehicle import Vehicle
 from .done import Array, Done, history, require
 

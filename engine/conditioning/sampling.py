@@ -7,10 +7,11 @@ from typing import Annotated, ClassVar
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from ..channels import Run, channel
+from ..channels import channel
 from ..errors import ConditioningError
 from ..filters import is_uniform, low_pass
 from ..plausibility import FEWEST_SAMPLES
+from ..run import Run
 from ..spikes import spike_samples, spikes
 from ..vehicle import Range, Vehicle
 from .done import Array, Done, history, recorded

@@ -5,11 +5,12 @@ from typing import Literal
 
 import numpy as np
 
-from ..channels import INPUT_CHANNELS, OUTPUT_CHANNELS, Run, channel
+from ..channels import INPUT_CHANNELS, OUTPUT_CHANNELS, channel
 from ..errors import ConditioningError
 from ..filters import PAD_PERIODS, is_uniform
 from ..frames import CORNERS, Corner
 from ..known_band import TIMES_LOWEST
+from ..run import Run
 from ..spikes import spike_samples
 from ..vehicle import Vehicle
 from .calibration import Rest, speeds, standstill

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import Run
 from ..demand import Demand
 from ..errors import Cancelled, SimulationDiverged, SimulationError
 from ..frames import CORNERS, Corner
 from ..manoeuvre import Manoeuvre
+from ..run import Run
 from ..simulation.output_channels import Points
 from .builder import Model
 from .equilibrium import settle

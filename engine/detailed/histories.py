@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import Run
+from ..run import Run
 from ..simulation.output_channels import Points
 from .builder import Model
 from .pose import point, point_acceleration, point_velocity, rotation, spin

@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from ..channels import Run
 from ..errors import ProblemError, RideError, SimulationError
 from ..parameters import parameter
+from ..run import Run
 from ..simulation.integration import cores
 from ..simulation.metrics import metrics
 from ..simulation.simulate import Model, Simulation

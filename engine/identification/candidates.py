@@ -10,9 +10,10 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..channels import INPUT_CHANNELS, OUTPUT_CHANNELS, Run
+from ..channels import INPUT_CHANNELS, OUTPUT_CHANNELS
 from ..errors import RideError
 from ..manoeuvre import Manoeuvre, manoeuvre_from_json, manoeuvre_to_json, reference_manoeuvres
+from ..run import Run
 from ..simulation.excitation import FreeExcitation
 from ..simulation.integration import cores
 from ..simulation.simulate import SAMPLE_STEP

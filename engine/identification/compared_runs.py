@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import OUTPUT_CHANNELS, Run
+from ..channels import OUTPUT_CHANNELS
 from ..errors import ProblemError
 from ..filters import low_pass, too_coarse
+from ..run import Run
 from ..run_notes import DEFAULT_NOISE
 from ..simulation.rims import RimsInputs, filtered_outputs, prepare
 from ..simulation.rims_settings import RimsSettings

@@ -17,8 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
+from ..channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS
 from ..filters import in_band
+from ..run import Run
 from ..simulation.car_rows import car_row
 from ..simulation.rims import prepare
 from ..simulation.rims_settings import RimsSettings

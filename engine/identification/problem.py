@@ -12,10 +12,11 @@ from typing import Any, TypeVar, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import OUTPUT_CHANNELS, Run
+from ..channels import OUTPUT_CHANNELS
 from ..equilibrium import static_loads
 from ..errors import ProblemError, VehicleError
 from ..parameters import ALL_NAMES, PARAMETER_NAMES, damper_starts, default_bounds, parameter
+from ..run import Run
 from ..simulation.car_rows import car_rows
 from ..simulation.rims_settings import RimsSettings
 from ..simulation.simulate import Traction

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from ..channels import INPUT_CHANNELS, WHEEL_CHANNELS, Run
+from ..channels import INPUT_CHANNELS, WHEEL_CHANNELS
 from ..errors import MeasurementError
+from ..run import Run
 from ..simulation.rims import RimsInputs
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import Run, channel
+from ..channels import channel
 from ..clocks import ROUNDING, Clocks, Series, clock_key, even_time, joined, way_of_time
 from ..csv_table import LARGEST_NUMBER
 from ..errors import MeasurementError
@@ -20,6 +20,7 @@ from ..plausibility import (
     doubtful_time,
     require_samples,
 )
+from ..run import Run
 from ..run_notes import checked_noise, doubtful_noise
 from ..units import to_si
 from .mapping import ChannelMapping, MappedColumn, Places

@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from ..channels import Run
 from ..errors import MeasurementError
 from ..formats.child import BOUNDS, Bounds
 from ..formats.opening import opened, opened_bytes
 from ..formats.table import Table
 from ..measurement import read_run
+from ..run import Run
 from ..run_notes import RunNotes, notes_beside, notes_in, read_notes
 from .apply import apply
 from .mapping import ChannelMapping

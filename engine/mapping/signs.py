@@ -15,8 +15,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
+from ..channels import OUTPUT_CHANNELS, WHEEL_CHANNELS
 from ..filters import low_pass, too_coarse
+from ..run import Run
 
 Array = NDArray[np.float64]
 Pair = tuple[str, str]

@@ -26,11 +26,11 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 from scipy.linalg import eigh, expm
 
-from ..channels import Run
 from ..demand import Demand, PostMotion, point_mass_motion
 from ..equilibrium import static_loads
 from ..frames import AXLES, CORNERS, side_of
 from ..roads.road import LEFT, RIGHT, Road
+from ..run import Run
 from ..vehicle import Vehicle
 from .output_channels import DEFAULT_POINTS, Points
 

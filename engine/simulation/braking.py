@@ -9,10 +9,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import Run
 from ..errors import MeasurementError, VehicleError
 from ..filters import smoothed
 from ..frames import GRAVITY
+from ..run import Run
 from ..vehicle import Vehicle
 
 Array = NDArray[np.float64]

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import Run
 from ..demand import Demand, PiecewiseLinear
 from ..manoeuvre import Manoeuvre, manoeuvre_to_json
 from ..roads.road import Road
+from ..run import Run
 from ..vehicle import Vehicle
 from .car_rows import car_row
 from .recorded_motion import RecordedMotion

@@ -11,8 +11,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import OUTPUT_CHANNELS, Run
+from ..channels import OUTPUT_CHANNELS
 from ..errors import MeasurementError
+from ..run import Run
 
 Array = NDArray[np.float64]
 

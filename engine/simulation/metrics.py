@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from ..channels import Run
 from ..filters import is_uniform, smoothed
 from ..frames import AXLES, CORNERS, AxleName, axle_of
 from ..iso2631 import Weighting, running_rms, vibration_dose, weighted
+from ..run import Run
 
 Array = NDArray[np.float64]
 

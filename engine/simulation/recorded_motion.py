@@ -22,10 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PPoly
 
-from ..channels import INPUT_CHANNELS, WHEEL_CHANNELS, Run
+from ..channels import INPUT_CHANNELS, WHEEL_CHANNELS
 from ..errors import MeasurementError
 from ..filters import PAD_PERIODS, is_uniform, resolved, smoothed, too_coarse
 from ..known_band import lowest_known, output_highpass
+from ..run import Run
 from .braking import slow_acceleration
 from .initial_state import measured_state
 from .recording_checks import Finding, check_recording, stands

@@ -11,9 +11,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, Run, channel
+from ..channels import (
+    INPUT_CHANNELS,
+    OUTPUT_CHANNELS,
+    WHEEL_CHANNELS,
+    channel,
+)
 from ..filters import low_pass, too_coarse
 from ..frames import CORNERS, GRAVITY
+from ..run import Run
 from ..spikes import spikes
 from ..vehicle import Vehicle
 from ..wheel_plane import plane_on_wheels

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import Run
 from ..frames import AXLES
 from ..iso2631 import RUNNING_TIME
 from ..kernels.histogram import QUANTITIES
 from ..kernels.tally import TALLY_ROWS, BodyTally, PointTally, WheelTally
 from ..kernels.watch import Watch
+from ..run import Run
 from ..weighting_filter import weighting_filter
 from .metrics import PERCENTILES, percentile_name, pushes
 

@@ -14,9 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import OUTPUT_CHANNELS, Run
+from ..channels import OUTPUT_CHANNELS
 from ..demand import rolling_resistance
 from ..filters import Band, in_band
+from ..run import Run
 from ..step_record import StepRecord
 from ..vehicle import Vehicle
 from .braking import Interval, braking_of, braking_weight

@@ -12,13 +12,14 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
+from ..channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS
 from ..demand import Demand, PiecewiseLinear, PostMotion
 from ..errors import SimulationDiverged, SimulationError
 from ..filters import smoothed
 from ..frames import AXLES, CORNERS
 from ..manoeuvre import Manoeuvre
 from ..roads.road import Road
+from ..run import Run
 from ..run_notes import DEFAULT_NOISE
 from ..vehicle import Vehicle
 from . import baseline

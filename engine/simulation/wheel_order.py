@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
-from ..channels import WHEEL_CHANNELS, Run
+from ..channels import WHEEL_CHANNELS
+from ..run import Run
 
 Array = NDArray[np.float64]
 Order = tuple[int, ...]

@@ -12,9 +12,9 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import Run
 from ..errors import RideError
 from ..frames import CORNERS
+from ..run import Run
 from ..simulation.excitation import Excitation
 from ..simulation.metrics import metrics
 from ..simulation.output_channels import DEFAULT_POINTS

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import Run
+from ..run import Run
 from ..simulation.car_rows import car_rows
 from ..simulation.excitation import Excitation, RimsExcitation
 from ..simulation.integration import Tallies, free_tallies, rims_tallies

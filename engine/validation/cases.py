@@ -6,13 +6,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..channels import OUTPUT_CHANNELS, Run
+from ..channels import OUTPUT_CHANNELS
 from ..errors import ManoeuvreError, ProblemError
 from ..identification.compared_runs import distinct_names, same_data
 from ..identification.sensing import corrected
 from ..identification.sensor_model import readings_in
 from ..manoeuvre import Manoeuvre
 from ..measurement import missing_for_identification
+from ..run import Run
 from ..vehicle import Vehicle
 
 Role = Literal["fit", "hold-out"]

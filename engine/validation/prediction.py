@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.stats import norm
 
-from ..channels import OUTPUT_CHANNELS, Run
+from ..channels import OUTPUT_CHANNELS
 from ..errors import RideError
 from ..identification.bands import bands
 from ..identification.kept_fit import KeptFit
 from ..identification.uncertainty import CONFIDENCE
 from ..rating import Rating, rate
+from ..run import Run
 from ..run_notes import DEFAULT_NOISE
 from ..simulation.excitation import Excitation, FreeExcitation, RimsExcitation
 from ..simulation.recorded_motion import recorded_motion

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import Run
+from ..run import Run
 from ..simulation.metrics import pushes
 
 Array = NDArray[np.float64]

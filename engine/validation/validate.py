@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..channels import Run
 from ..errors import Cancelled
 from ..identification.kept_fit import KeptFit
 from ..manoeuvre import Manoeuvre
 from ..roads.road_spectrum import RoadSpectrum, road_spectra
+from ..run import Run
 from ..simulation.rims_settings import RimsSettings
 from ..simulation.simulate import Traction
 from ..vehicle import Vehicle

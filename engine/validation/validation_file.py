@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
+from ..channels import OUTPUT_CHANNELS, WHEEL_CHANNELS
 from ..frames import CORNERS
 from ..identification.fit_file import plain
 from ..manoeuvre import manoeuvre_to_json
 from ..roads.iso8608 import CLASSES, REFERENCE_FREQUENCY
 from ..roads.road_spectrum import RoadSpectrum
+from ..run import Run
 from .geometry import Geometry
 from .prediction import Prediction, Score
 from .validate import ValidatedRun, Validation

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ridetune.app.cli import main
-from ridetune.engine.channels import Run
 from ridetune.engine.measurement import read_run, write_run
 from ridetune.engine.parameters import PARAMETER_NAMES
+from ridetune.engine.run import Run
 from ridetune.engine.vehicle_file import read_vehicle, reference_vehicles, write_vehicle
 
 from .command_line import RECORDED, refused

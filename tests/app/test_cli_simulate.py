@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from ridetune.app.cli import main
-from ridetune.engine.channels import Run
 from ridetune.engine.measurement import read_run, write_run
+from ridetune.engine.run import Run
 from ridetune.engine.vehicle_file import reference_vehicles, write_vehicle
 
 from .command_line import RECORDED, SHORT, refused

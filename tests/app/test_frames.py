@@ -8,8 +8,8 @@ import pytest
 from numpy.testing import assert_array_equal
 from ridetune.app import frames
 from ridetune.app.errors import NotAcceptable
-from ridetune.engine.channels import Run
 from ridetune.engine.errors import MeasurementError
+from ridetune.engine.run import Run
 
 
 @pytest.fixture

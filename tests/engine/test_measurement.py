@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import ridetune.sample_runs
-from ridetune.engine.channels import CHANNELS, Run
+from ridetune.engine.channels import CHANNELS
 from ridetune.engine.errors import MeasurementError, UnmappedError
 from ridetune.engine.formats import csv_file
 from ridetune.engine.formats.opening import opened_bytes
@@ -17,6 +17,7 @@ from ridetune.engine.measurement import (
     run_to_csv,
     write_run,
 )
+from ridetune.engine.run import Run
 
 SAMPLES = 20
 TIME = np.arange(SAMPLES) / 100

@@ -3,8 +3,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ridetune.engine.channels import Run
 from ridetune.engine.errors import MeasurementError
+from ridetune.engine.run import Run
 from ridetune.engine.run_notes import (
     checked_noise,
     doubtful_noise,

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.engine.channels import Run
+from ridetune.engine.run import Run
 from ridetune.engine.sensors import RECORDED, Sensor, SensorSet, measured
 
 DENSE = np.arange(4001) * 0.0025

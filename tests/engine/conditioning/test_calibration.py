@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.engine.channels import Run
 from ridetune.engine.conditioning.calibration import Rest, Scale, standstill
 from ridetune.engine.conditioning.chain import condition
 from ridetune.engine.errors import ConditioningError
+from ridetune.engine.run import Run
 
 TIME = np.arange(0.0, 10.0, 0.01)
 MOVES = np.where(TIME < 3.0, 0.0, np.sin(2 * np.pi * 1.5 * (TIME - 3.0)))

@@ -3,7 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from ridetune.engine.channels import Run
 from ridetune.engine.conditioning.calibration import Rest, Scale
 from ridetune.engine.conditioning.chain import condition, steps_from_json, steps_to_json
 from ridetune.engine.conditioning.delay import Delay
@@ -11,6 +10,7 @@ from ridetune.engine.conditioning.motion import Angles, Displacement, Gravity, S
 from ridetune.engine.conditioning.rims import RimFromTravel
 from ridetune.engine.conditioning.sampling import Cut, Despike, Fill, Resample
 from ridetune.engine.errors import ConditioningError, MeasurementError
+from ridetune.engine.run import Run
 from ridetune.engine.step_record import step_record_to_json, step_records_from_json
 
 EVERY = (

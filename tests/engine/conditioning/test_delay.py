@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.engine.channels import Run
 from ridetune.engine.conditioning.chain import condition
 from ridetune.engine.conditioning.delay import Delay, find_lag
 from ridetune.engine.errors import ConditioningError
 from ridetune.engine.filters import in_band
+from ridetune.engine.run import Run
 from scipy.interpolate import CubicSpline
 
 from ...factories import paper_vehicle

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ridetune.engine.channels import Run
 from ridetune.engine.conditioning.kinds import steps_to_add
 from ridetune.engine.conditioning.suggestion import suggest
+from ridetune.engine.run import Run
 
 from ...factories import paper_vehicle
 from ...raw_sensors import drive, recorded

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ridetune.engine.channels import Run
 from ridetune.engine.conditioning.chain import condition
 from ridetune.engine.conditioning.lateness import find_lateness
 from ridetune.engine.conditioning.motion import Angles, Speed
 from ridetune.engine.conditioning.suggestion import suggest
 from ridetune.engine.filters import in_band
+from ridetune.engine.run import Run
 from ridetune.engine.simulation.rims import prepare
 from scipy.interpolate import CubicSpline
 

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.engine.channels import CORNERS, Run
+from ridetune.engine.channels import CORNERS
 from ridetune.engine.conditioning.chain import condition
 from ridetune.engine.conditioning.motion import Angles, Displacement, Gravity, Speed
 from ridetune.engine.conditioning.rims import RimFromTravel
 from ridetune.engine.errors import ConditioningError
 from ridetune.engine.filters import ORDER, in_band
+from ridetune.engine.run import Run
 
 from ...factories import paper_vehicle
 from ...raw_sensors import BOOT, G, drive, recorded, specific_force

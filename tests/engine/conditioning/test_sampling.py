@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from ridetune.engine.channels import Run, channel
+from ridetune.engine.channels import channel
 from ridetune.engine.conditioning.chain import condition
 from ridetune.engine.conditioning.sampling import Cut, Despike, Fill, Resample
 from ridetune.engine.errors import ConditioningError
+from ridetune.engine.run import Run
 from ridetune.engine.spikes import spikes
 
 STEP = 0.002

@@ -4,13 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ridetune.engine.channels import CORNERS, Run
+from ridetune.engine.channels import CORNERS
 from ridetune.engine.conditioning.chain import condition
 from ridetune.engine.conditioning.suggestion import suggest
 from ridetune.engine.filters import in_band
 from ridetune.engine.identification.fit_file import fit_to_json
 from ridetune.engine.identification.identify import Problem, identify
 from ridetune.engine.measurement import missing_for_identification
+from ridetune.engine.run import Run
 from ridetune.engine.simulation.rims import prepare
 from ridetune.engine.simulation.rims_settings import RimsSettings
 from scipy.interpolate import CubicSpline

@@ -15,7 +15,6 @@ import pyuff
 from asammdf import MDF, Signal
 from nptdms import ChannelObject, TdmsWriter
 from numpy.testing import assert_allclose
-from ridetune.engine.channels import Run
 from ridetune.engine.clocks import even_time
 from ridetune.engine.errors import MeasurementError
 from ridetune.engine.formats.child import ChildTable
@@ -24,6 +23,7 @@ from ridetune.engine.formats.kinds import kind_of
 from ridetune.engine.formats.table import Column, HeldTable
 from ridetune.engine.mdf4 import run_to_mdf4
 from ridetune.engine.measurement import read_run
+from ridetune.engine.run import Run
 
 from tests import files_of_kinds as files
 

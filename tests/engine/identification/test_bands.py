@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from ridetune.engine.campaign import drive_table_2
-from ridetune.engine.channels import Run
 from ridetune.engine.errors import ProblemError, SimulationError
 from ridetune.engine.identification.bands import FEWEST_CARS, bands, drawn, percentiles
 from ridetune.engine.identification.fit_file import fit_to_json
@@ -14,6 +13,7 @@ from ridetune.engine.identification.problem import FreeParameter, Problem
 from ridetune.engine.identification.uncertainty import Uncertainty
 from ridetune.engine.manoeuvre import reference_manoeuvres
 from ridetune.engine.parameters import default_bounds
+from ridetune.engine.run import Run
 from ridetune.engine.run_notes import DEFAULT_NOISE
 from ridetune.engine.simulation.excitation import FreeExcitation
 from ridetune.engine.simulation.metrics import metrics, rms

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ridetune.engine.campaign import drive_table_2
-from ridetune.engine.channels import WHEEL_CHANNELS, Run
+from ridetune.engine.channels import WHEEL_CHANNELS
 from ridetune.engine.identification.fit import Outcome
 from ridetune.engine.identification.identify import Problem, identify
 from ridetune.engine.identification.residuals import Residuals
@@ -15,6 +15,7 @@ from ridetune.engine.identification.uncertainty import information, uncertainty
 from ridetune.engine.manoeuvre import read_manoeuvre
 from ridetune.engine.measurement import read_run
 from ridetune.engine.parameters import ALL_NAMES, DAMPER_NAMES, PARAMETER_NAMES, PARAMETERS
+from ridetune.engine.run import Run
 from ridetune.engine.run_notes import DEFAULT_NOISE
 from ridetune.engine.simulation.rims_settings import RimsSettings
 from ridetune.engine.simulation.simulate import rims_batch, simulate_rims

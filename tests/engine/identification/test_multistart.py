@@ -6,12 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.engine.channels import INPUT_CHANNELS, Run
+from ridetune.engine.channels import INPUT_CHANNELS
 from ridetune.engine.errors import Cancelled, ProblemError
 from ridetune.engine.identification.fit import Ending
 from ridetune.engine.identification.identify import Problem, identify
 from ridetune.engine.identification.multistart import REFINED, spread
 from ridetune.engine.identification.search import Found
+from ridetune.engine.run import Run
 from scipy.optimize import minimize_scalar
 
 from ... import stand_in

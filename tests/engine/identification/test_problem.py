@@ -3,11 +3,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ridetune.engine.channels import INPUT_CHANNELS, OUTPUT_CHANNELS, Run
+from ridetune.engine.channels import INPUT_CHANNELS, OUTPUT_CHANNELS
 from ridetune.engine.errors import MeasurementError, ParameterError, ProblemError
 from ridetune.engine.filters import low_pass
 from ridetune.engine.identification.problem import FreeParameter, Problem
 from ridetune.engine.parameters import PARAMETER_NAMES
+from ridetune.engine.run import Run
 from ridetune.engine.run_notes import DEFAULT_NOISE
 from ridetune.engine.simulation.rims_settings import RimsSettings
 

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import ridetune.sample_runs
-from ridetune.engine.channels import Run, channel
+from ridetune.engine.channels import channel
 from ridetune.engine.formats.table import Column, HeldTable
 from ridetune.engine.mapping.guess import Guess, guess
 from ridetune.engine.mapping.survey import survey
 from ridetune.engine.measurement import read_run
+from ridetune.engine.run import Run
 from ridetune.engine.units import to_si
 
 Names = Mapping[str, tuple[str, str, str]]

@@ -3,8 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.engine.channels import INPUT_CHANNELS, Run
+from ridetune.engine.channels import INPUT_CHANNELS
 from ridetune.engine.errors import MeasurementError, VehicleError
+from ridetune.engine.run import Run
 from ridetune.engine.simulation.braking import braking_weight, find_braking, slow_acceleration
 from ridetune.engine.simulation.rims import prepare
 from ridetune.engine.vehicle import Brakes

@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.engine.channels import WHEEL_CHANNELS, Run
+from ridetune.engine.channels import WHEEL_CHANNELS
 from ridetune.engine.demand import Demand, PiecewiseLinear, PostMotion
 from ridetune.engine.manoeuvre import reference_manoeuvres
+from ridetune.engine.run import Run
 from ridetune.engine.simulation.car_rows import car_row
 from ridetune.engine.simulation.integration import free_states
 from ridetune.engine.simulation.rims import prepare

@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.engine.channels import Run
 from ridetune.engine.demand import Demand, PiecewiseLinear, PostMotion
 from ridetune.engine.manoeuvre import Manoeuvre
 from ridetune.engine.roads.road import Road
+from ridetune.engine.run import Run
 from ridetune.engine.simulation.car_rows import car_row
 from ridetune.engine.simulation.integration import free_states
 from ridetune.engine.simulation.rims import prepare

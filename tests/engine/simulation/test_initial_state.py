@@ -2,10 +2,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ridetune.engine.channels import OUTPUT_CHANNELS, Run
+from ridetune.engine.channels import OUTPUT_CHANNELS
 from ridetune.engine.identification.identify import Problem, identify
 from ridetune.engine.manoeuvre import reference_manoeuvres
 from ridetune.engine.parameters import PARAMETER_NAMES
+from ridetune.engine.run import Run
 from ridetune.engine.run_notes import DEFAULT_NOISE
 from ridetune.engine.simulation.initial_state import swings_in
 from ridetune.engine.simulation.rims_settings import RimsSettings

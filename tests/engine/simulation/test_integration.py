@@ -2,8 +2,9 @@
 
 import numpy as np
 from numpy.testing import assert_array_equal
-from ridetune.engine.channels import INPUT_CHANNELS, Run
+from ridetune.engine.channels import INPUT_CHANNELS
 from ridetune.engine.demand import Demand, PiecewiseLinear, PostMotion
+from ridetune.engine.run import Run
 from ridetune.engine.simulation.car_rows import car_rows
 from ridetune.engine.simulation.integration import (
     ARM_ACCELERATIONS,

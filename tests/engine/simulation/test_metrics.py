@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.engine.channels import Run
 from ridetune.engine.frames import CORNERS
 from ridetune.engine.iso2631 import response
+from ridetune.engine.run import Run
 from ridetune.engine.simulation.metrics import comfort_word, metrics, rms
 
 TIME = np.arange(0.0, 60.0, 0.005)

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
-from ridetune.engine.channels import INPUT_CHANNELS, Run
+from ridetune.engine.channels import INPUT_CHANNELS
+from ridetune.engine.run import Run
 from ridetune.engine.simulation.recording_checks import check_on_car, check_recording, stands
 from ridetune.engine.simulation.wheel_order import wheel_rises
 

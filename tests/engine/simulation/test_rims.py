@@ -3,8 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.engine.channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, Run
+from ridetune.engine.channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS
 from ridetune.engine.errors import MeasurementError, SimulationError
+from ridetune.engine.run import Run
 from ridetune.engine.simulation.recorded_motion import recorded_motion
 from ridetune.engine.simulation.rims import for_car, prepare
 from ridetune.engine.simulation.rims_settings import RimsSettings

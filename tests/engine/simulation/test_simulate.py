@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.engine.channels import Run
 from ridetune.engine.curves import smooth_step
 from ridetune.engine.errors import RoadError, SimulationDiverged, SimulationError
 from ridetune.engine.frames import AXLES, CORNERS, GRAVITY
@@ -13,6 +12,7 @@ from ridetune.engine.identification.identify import identify
 from ridetune.engine.identification.problem import Problem
 from ridetune.engine.manoeuvre import manoeuvre_from_json, reference_manoeuvres
 from ridetune.engine.roads.road import Road
+from ridetune.engine.run import Run
 from ridetune.engine.simulation.car_rows import car_row, car_rows
 from ridetune.engine.simulation.integration import free_states
 from ridetune.engine.simulation.rims import prepare

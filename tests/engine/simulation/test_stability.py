@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.engine.channels import Run
 from ridetune.engine.demand import Demand, PiecewiseLinear
 from ridetune.engine.errors import SimulationError
 from ridetune.engine.frames import CORNERS
 from ridetune.engine.identification.problem import Problem
 from ridetune.engine.identification.residuals import Residuals
 from ridetune.engine.manoeuvre import manoeuvre_from_json, reference_manoeuvres
+from ridetune.engine.run import Run
 from ridetune.engine.simulation.car_rows import car_row
 from ridetune.engine.simulation.integration import free_states, rims_states
 from ridetune.engine.simulation.rims import prepare

@@ -9,10 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from ridetune.engine.channels import Run
 from ridetune.engine.errors import Cancelled, RideError, SimulationError, SweepError
 from ridetune.engine.manoeuvre import reference_manoeuvres
 from ridetune.engine.parameters import number_path
+from ridetune.engine.run import Run
 from ridetune.engine.simulation.excitation import FreeExcitation, RimsExcitation
 from ridetune.engine.simulation.metrics import metrics
 from ridetune.engine.simulation.recorded_motion import recorded_motion

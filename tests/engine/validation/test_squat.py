@@ -2,8 +2,8 @@ from pathlib import Path
 
 import numpy as np
 from numpy.testing import assert_allclose
-from ridetune.engine.channels import Run
 from ridetune.engine.measurement import read_run
+from ridetune.engine.run import Run
 from ridetune.engine.validation.squat import squat_window
 
 MANOEUVRE_2 = Path(__file__).parents[3] / "sample_runs/twin/manoeuvre_2.csv"
