@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..simulation.channel_faults import NOISE_EXPLAINS, ChannelFaults, channel_faults
-from ..simulation.simulate import fit_percent
+from ..simulation.comparison import fit_percent
 from ..units import after_number, in_percent
 from .compared_runs import ComparedRun
 from .fit import CombinationEstimate, Estimate, FittedRun, Minimum, SensorEstimate

@@ -37,8 +37,9 @@ from ..errors import Cancelled
 from ..filters import in_band
 from ..kernels.lanes import BATCH
 from ..simulation.car_rows import car_row
+from ..simulation.comparison import fit_percent
 from ..simulation.rims import RimsInputs
-from ..simulation.simulate import Traction, fit_percent
+from ..simulation.simulate import Traction
 from ..simulation.stability import check_rims_step
 from .condensed import triangle
 from .problem import Problem

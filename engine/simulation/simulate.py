@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS
+from ..channels import OUTPUT_CHANNELS, WHEEL_CHANNELS
 from ..demand import Demand, PiecewiseLinear, PostMotion
 from ..errors import SimulationDiverged, SimulationError
 from ..filters import smoothed
@@ -20,12 +20,10 @@ from ..frames import AXLES, CORNERS
 from ..manoeuvre import Manoeuvre
 from ..roads.road import Road
 from ..run import Run
-from ..run_notes import DEFAULT_NOISE
 from ..vehicle import Vehicle
 from . import baseline
 from .car_rows import car_row
-from .channel_faults import channel_faults
-from .initial_state import swings_in
+from .comparison import compared
 from .integration import check_sound, free_outputs, free_states, rims_outputs, rims_states
 from .output_channels import (
     DEFAULT_POINTS,
@@ -36,13 +34,12 @@ from .output_channels import (
     traction_torques,
 )
 from .recorded_motion import RecordedMotion, recorded_motion
-from .rims import RimsInputs, filtered_outputs, for_car
+from .rims import RimsInputs, for_car
 from .rims_settings import RimsSettings
 from .stability import check_free_step, check_rims_step, stable_on_rims
 from .stepping import prepare_free
 
 Array = NDArray[np.float64]
-Outputs = Mapping[str, Array]
 Model = Literal["8dof", "7dof"]
 Traction = Literal["exact", "paper"]
 
@@ -184,22 +181,15 @@ def simulate_rims(
         result = replace(baseline.simulate_rims(vehicle, run.time, heights, points), name=run.name)
     else:
         result = _rims_run(vehicle, inputs, traction, points)
-    band = settings.output_band
-    recorded, followed = (filtered_outputs(one, band) for one in (run, result))
-    faults = inputs.faults
-    if model == "8dof" and not faults:  # which would make every output look wrong
-        faults = _channel_faults(run, recorded, followed)
-    warnings = [*inputs.warnings, *ignored, *faults]
-    if not inputs.stands:
-        warnings += _swing(run, recorded, followed, model, settings)
+    found = compared(run, result, inputs, settings, linear=model == "7dof")
     return Simulation(
         "rims",
         result,
         _load_shares(result),
         inputs.node_time.size - 1,
-        _fit_percent(run, result, recorded, followed),
-        tuple(dict.fromkeys(warnings)),
-        faults,
+        found.fit_percent,
+        tuple(dict.fromkeys([*inputs.warnings, *ignored, *found.warnings])),
+        found.faults,
     )
 
 
@@ -214,15 +204,6 @@ def rims_batch(cars: Array, inputs: RimsInputs, traction: Traction) -> Array:
         states = rims_states(cars[stable], inputs, traction == "exact").values
         found[stable] = inputs.at_samples(states[:, :, 1:4], states[:, :, 9:12])
     return found
-
-
-def fit_percent(measured: Array, simulated: Array) -> float:
-    """100 (1 - |y - y_hat| / |y - mean(y)|); minus infinity for a constant measurement missed."""
-    scatter = float(np.linalg.norm(measured - np.mean(measured)))
-    miss = float(np.linalg.norm(measured - simulated))
-    if scatter == 0.0:
-        return 100.0 if miss == 0.0 else -np.inf
-    return 100.0 * (1.0 - miss / scatter)
 
 
 def _free(
@@ -387,39 +368,6 @@ def _road_warnings(road: Road, vehicle: Vehicle, run: Run) -> tuple[str, ...]:
             " is level from there on; lengthen the profile, shift its x or shorten the manoeuvre."
         )
     return tuple(warnings)
-
-
-def _fit_percent(
-    measured: Run, simulated: Run, recorded: Outputs, followed: Outputs
-) -> dict[str, float]:
-    """Fit of every channel that was measured, simulated and not prescribed.
-
-    recorded, followed : their outputs as compared
-    """
-    given = {*INPUT_CHANNELS, "chassis.v_x", "chassis.x"}
-    return {
-        name: fit_percent(recorded.get(name, measured[name]), followed.get(name, simulated[name]))
-        for name in measured.columns
-        if name in simulated and name not in given
-    }
-
-
-def _channel_faults(run: Run, recorded: Outputs, followed: Outputs) -> tuple[str, ...]:
-    """What is probably wrong with the recorded outputs; gaps tell nothing."""
-    whole = {name: values for name, values in recorded.items() if np.isfinite(values).all()}
-    found = channel_faults(run.name, whole, {**DEFAULT_NOISE, **run.noise}, followed)
-    return tuple(sentence for one in found.values() for sentence in one.sentences)
-
-
-def _swing(
-    measured: Run, recorded: Outputs, followed: Outputs, model: Model, settings: RimsSettings
-) -> list[str]:
-    """A sentence where the record starts away from the equilibrium in which the model starts."""
-    name, time = measured.name, measured.time
-    if model == "7dof":
-        remedy = "begin the run at rest, as the 7-DOF model does"
-        return swings_in(name, time, recorded, followed, remedy=remedy)
-    return [] if settings.initial_state == "measured" else swings_in(name, time, recorded, followed)
 
 
 def _load_shares(run: Run) -> dict[str, float]:

@@ -17,11 +17,12 @@ from ..identification.uncertainty import CONFIDENCE
 from ..rating import Rating, rate
 from ..run import Run
 from ..run_notes import DEFAULT_NOISE
+from ..simulation.comparison import fit_percent
 from ..simulation.excitation import Excitation, FreeExcitation, RimsExcitation
 from ..simulation.recorded_motion import recorded_motion
 from ..simulation.rims import filtered_outputs
 from ..simulation.rims_settings import RimsSettings
-from ..simulation.simulate import Model, Simulation, Traction, fit_percent
+from ..simulation.simulate import Model, Simulation, Traction
 from ..vehicle import Vehicle
 from .cases import Case
 from .squat import SquatWindow
