@@ -12,6 +12,7 @@ whatever arithmetic a file's header holds, and a table of words that mean someth
 
 import math
 import re
+from collections.abc import Sequence
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -46,6 +47,11 @@ def in_percent(share: float) -> str:
     if abs(value) < LEAST_PERCENT:
         return f"<{LEAST_PERCENT:g} %"
     return f"{round(value, 1 - math.floor(math.log10(abs(value)))):.15g} %"
+
+
+def listed(words: Sequence[str]) -> str:
+    """Words as they stand in a sentence: "a", "a and b", "a, b and c"."""
+    return f"{', '.join(words[:-1])}{' and ' if words[1:] else ''}{words[-1]}"
 
 
 _PLAIN_NUMBER = {"", "-", "1"}

@@ -142,7 +142,10 @@ class Offer:
 
 @dataclass(frozen=True, slots=True)
 class CombinationEstimate:
-    """A quantity that several parameters make together, SI; fields as of `Estimate`."""
+    """A quantity that several parameters make together, SI; fields as of `Estimate`.
+
+    of : names of the parameters that were free and act in it
+    """
 
     name: str
     symbol: str
@@ -177,12 +180,15 @@ class Verdict:
     parameters : by "yes", "weakly" and "no", their names
     combinations : that the runs determine better than their parameters
     directions : axes of the covariance, the least determined first
+    conditions : what is at a bound without which parameters or combinations that are determined
+        would be elsewhere
     sentences : the same for a person
     """
 
     parameters: Mapping[str, tuple[str, ...]]
     combinations: tuple[CombinationEstimate, ...]
     directions: tuple[Direction, ...]
+    conditions: tuple[str, ...]
     sentences: tuple[str, ...]
 
 

@@ -9,9 +9,16 @@ from numpy.typing import NDArray
 
 from ..simulation.channel_faults import NOISE_EXPLAINS, ChannelFaults, channel_faults
 from ..simulation.comparison import fit_percent
-from ..units import after_number, in_percent
+from ..units import after_number, in_percent, listed
 from .compared_runs import ComparedRun
-from .fit import CombinationEstimate, Estimate, FittedRun, Minimum, SensorEstimate
+from .fit import (
+    CombinationEstimate,
+    Estimate,
+    FittedRun,
+    Minimum,
+    SensorEstimate,
+    Verdict,
+)
 from .problem import Problem
 from .uncertainty import Uncertainty
 
@@ -156,15 +163,9 @@ def _ratio(one: Minimum, other: Minimum, name: str) -> float:
     return abs(first - second) / max(abs(first), abs(second), 1e-9)
 
 
-def bound_findings(
-    estimates: Sequence[Estimate], combinations: Sequence[CombinationEstimate] = ()
-) -> list[str]:
-    """What is at a bound.
-
-    combinations : those that the verdict tells of; what is known in one of them alone would drift
-        to any bound
-    """
-    return [_at_bound(one, combinations) for one in estimates if one.at_bound]
+def bound_findings(estimates: Sequence[Estimate], verdict: Verdict) -> list[str]:
+    """What is at a bound, and whether a wider one would help."""
+    return [_at_bound(one, verdict) for one in estimates if one.at_bound]
 
 
 def undetermined_findings(
@@ -213,7 +214,7 @@ def undetermined_findings(
     return found
 
 
-def _at_bound(one: Estimate, combinations: Sequence[CombinationEstimate]) -> str:
+def _at_bound(one: Estimate, verdict: Verdict) -> str:
     at_lower = one.value - one.lower < one.upper - one.value
     side, bound = ("lower", one.lower) if at_lower else ("upper", one.upper)
     said = f"{one.title} is at its {side} bound, {bound:.4g}{after_number(one.unit)}"
@@ -224,11 +225,13 @@ def _at_bound(one: Estimate, combinations: Sequence[CombinationEstimate]) -> str
             f"{said}: the runs show no knee, as"
             " if the damper kept its slopes at every speed; fix it or add a rougher run."
         )
-    for combination in combinations:
+    if one.name in verdict.conditions:
+        return f"{said}, and holds others back; widen the bound, or fix it if it is known."
+    for combination in verdict.combinations:
         others = [name for name in combination.of if name != one.name]
-        if one.name in combination.of and combination.determined != "no":
+        if one.name in combination.of and others:
             return (
-                f"{said}; the runs know it only together with {' and '.join(others)}, as "
+                f"{said}; the runs know it only together with {listed(others)}, as "
                 f"{combination.symbol}, so a wider bound would not help: fix one of them at its "
                 "known value, or add a run that tells them apart."
             )

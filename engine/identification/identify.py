@@ -9,7 +9,7 @@ tells what the paper's campaign can and cannot determine.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +25,7 @@ from .estimates import estimates
 from .fit import (
     CONVERGED,
     Ending,
+    Estimate,
     Fit,
     FittedRun,
     Minimum,
@@ -140,7 +141,10 @@ def identify(
         parameters = tuple(replace(one, determined="no") for one in parameters)
         sensors = tuple(replace(one, determined="no") for one in sensors)
     vehicle = problem.vehicle_at(solution.x)
-    judged = verdict(parameters, errors, vehicle) if converged else without_verdict(parameters)
+    judged = without_verdict(parameters)
+    if converged:
+        released = _released(solution, [*parameters, *sensors], problem)
+        judged = verdict(parameters, errors, vehicle, released)
     warnings = [
         *(warning for seen in problem.runs for warning in seen.inputs.warnings),
         *moved,
@@ -155,7 +159,7 @@ def identify(
             *outlier_findings(problem, runs),
             *disagreements(priors, problem.free),
             *whiteness_findings(tests),
-            *bound_findings([*parameters, *sensors], judged.combinations),
+            *bound_findings([*parameters, *sensors], judged),
         ]
     if converged:
         warnings += undetermined_findings([*parameters, *sensors], of_all, judged.combinations)
@@ -296,6 +300,17 @@ def _minimum(ended: list[Found], residuals: Residuals) -> Minimum:
         ),
         outcome=lowest.ending,
     )
+
+
+def _released(found: Found, estimates: Sequence[Estimate], problem: Problem) -> dict[str, Array]:
+    """How far the parameters' variables (n,) would go were one bound further away, by the title of
+    what is at it."""
+    sides = np.zeros(len(estimates), dtype=np.int64)
+    for k, (one, free) in enumerate(zip(estimates, problem.variables, strict=True)):
+        if one.at_bound:
+            sides[k] = 1 if found.x[k] > 0.5 * sum(free.ends) else -1
+    steps = found.released(sides)
+    return {estimates[k].title: step[: len(problem.free)] for k, step in steps.items()}
 
 
 def _outcome(

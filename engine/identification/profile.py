@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from ..errors import ProblemError
 from ..parameters import parameter
 from ..simulation.simulate import rims_batch
-from ..units import after_number
+from ..units import after_number, listed
 from .problem import FreeParameter, Problem
 from .residuals import Residuals, Simulate
 from .search import Found, Search
@@ -255,21 +255,22 @@ class _Tour:
 
 
 def _ended_by(held: str, side: str, names: Sequence[str], end: ProfilePoint) -> list[str]:
-    """What to say of a side that ends with some parameters at their bounds."""
-    values = {**end.others, held: end.value}
-    told = {
-        name: f"{name} of {values[name]:.4g}{after_number(parameter(name).unit)}" for name in names
-    }
-    sentences = []
-    if held in told:
-        sentences.append(f"The {side} side ends at the search's bound, {told.pop(held)}.")
-    if told:
-        is_at, it = ("is at its bound", "it") if len(told) == 1 else ("are at their bounds", "them")
-        sentences.append(
-            f"On the {side} side {' and '.join(told.values())} {is_at}, and not the runs alone end "
-            f"the profile; widen the search, or fix {it} at what is known."
-        )
-    return sentences
+    """What to say of a side that ends with some parameters at their bounds: with the parameter
+    itself there, others have not ended it."""
+    if held in names:
+        return [f"The {side} side ends at the search's bound, {_told(held, end.value)}."]
+    if not names:
+        return []
+    is_at, it = ("is at its bound", "it") if len(names) == 1 else ("are at their bounds", "them")
+    others = listed([_told(name, end.others[name]) for name in names])
+    return [
+        f"On the {side} side {others} {is_at}, and not the runs alone end the profile; widen the "
+        f"search, or fix {it} at what is known."
+    ]
+
+
+def _told(name: str, value: float) -> str:
+    return f"{name} of {value:.4g}{after_number(parameter(name).unit)}"
 
 
 def _end(

@@ -44,6 +44,10 @@ SAME_VALUES = 1e-3
 already."""
 
 
+RELEASED = 1.0
+"""Of the search's variables, where 1 is about 100 %: how much further a bound is thought to be."""
+
+
 @dataclass(frozen=True, slots=True)
 class Found:
     """Where one refinement ended.
@@ -91,7 +95,28 @@ class Found:
 
     def beyond(self) -> Array:
         """Where the search would go on to were there no bounds."""
-        return self.x - np.linalg.lstsq(self.jacobian, self.rows, rcond=DIRECTION_TOLERANCE)[0]
+        return self.x + self._step(np.ones(len(self.x), dtype=bool))
+
+    def released(self, sides: NDArray[np.int64]) -> dict[int, Array]:
+        """How far all would go, (n,), were one bound RELEASED further away, by that one's place.
+
+        sides : (n,) -1 or 1 where a variable is at the lower or the upper end of its range, else 0
+        Those that the search would leave if there were no bounds at all are left out.
+        """
+        free, found = sides == 0, {}
+        onwards = sides * (self.beyond() - self.x) > 0.0
+        for k in np.flatnonzero(onwards).tolist():
+            step = self._step(free | (np.arange(len(sides)) == k))
+            if sides[k] * step[k] > 0.0:
+                found[k] = step * min(1.0, RELEASED / abs(step[k]))
+        return found
+
+    def _step(self, free: NDArray[np.bool_]) -> Array:
+        """The Gauss-Newton step of some variables; the others stay."""
+        step = np.zeros_like(self.x)
+        columns = self.jacobian[:, free]
+        step[free] = -np.linalg.lstsq(columns, self.rows, rcond=DIRECTION_TOLERANCE)[0]
+        return step
 
     def holds(self, x: Array, cost: float, gradient: Array) -> bool:
         """Whether x lies where the quadratic about this minimum is the cost: its basin.

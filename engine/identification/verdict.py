@@ -17,8 +17,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..parameters import parameter
-from ..units import after_number, in_percent
+from ..parameters import ALL_NAMES, parameter
+from ..units import after_number, in_percent, listed
 from ..vehicle import Vehicle
 from .combinations import COMBINATIONS, Combination
 from .fit import CombinationEstimate, Direction, ParameterEstimate, Verdict, determined
@@ -40,11 +40,16 @@ ORDER = ("yes", "weakly", "no")
 
 
 def verdict(
-    estimates: Sequence[ParameterEstimate], errors: Uncertainty, vehicle: Vehicle
+    estimates: Sequence[ParameterEstimate],
+    errors: Uncertainty,
+    vehicle: Vehicle,
+    released: Mapping[str, Array] | None = None,
 ) -> Verdict:
     """The verdict on a fit that converged.
 
     errors : of the search's variables;  vehicle : at the solution
+    released : by the title of what is at a bound, how far the variables (n,) would go were it
+        further away (`Found.released`)
     """
     classes = by_class(estimates)
     names = [one.name for one in estimates]
@@ -59,14 +64,17 @@ def verdict(
         if one.name in gradients
         and (estimate := _held_together(one, gradients[one.name], estimates, errors, vehicle))
     ]
+    conditions = _conditions(estimates, combined, gradients, errors, released or {})
+    held = _if_held(conditions)
     return Verdict(
         parameters=classes,
         combinations=tuple(combined),
         directions=tuple(_directions(names, errors, gradients)),
+        conditions=conditions,
         sentences=(
-            *_of_parameters(classes, _conditions(estimates, combined)),
+            *_of_parameters(classes, held),
             *(
-                _of_combination(one, classes["yes"])
+                _of_combination(one, classes["yes"], bool(held))
                 for one in _news(combined, gradients, estimates)
             ),
         ),
@@ -75,7 +83,7 @@ def verdict(
 
 def without_verdict(estimates: Sequence[ParameterEstimate]) -> Verdict:
     """That on a fit whose errors mean nothing."""
-    return Verdict(by_class(estimates), (), (), ())
+    return Verdict(by_class(estimates), (), (), (), ())
 
 
 def by_class(estimates: Sequence[ParameterEstimate]) -> dict[str, tuple[str, ...]]:
@@ -114,7 +122,8 @@ def _held_together(
     members = [k for k, slope in enumerate(gradient.tolist()) if slope]
     if not members:
         return None
-    estimate = _estimate(one, gradient, errors, vehicle)
+    of = tuple(estimates[k].name for k in members)
+    estimate = _estimate(one, of, gradient, errors, vehicle)
     apart = float(np.linalg.norm(gradient[members] * errors.std_error[members]))
     worst = max(ORDER.index(estimates[k].determined) for k in members)
     better = ORDER.index(estimate.determined) < worst
@@ -140,7 +149,7 @@ def _news(
 
 
 def _estimate(
-    one: Combination, gradient: Array, errors: Uncertainty, vehicle: Vehicle
+    one: Combination, of: tuple[str, ...], gradient: Array, errors: Uncertainty, vehicle: Vehicle
 ) -> CombinationEstimate:
     value, error = one.value(vehicle), errors.error_of(gradient)
     half_width = errors.quantile * error
@@ -152,7 +161,7 @@ def _estimate(
         symbol=one.symbol,
         label=one.label,
         unit=one.unit,
-        of=one.of,
+        of=of,
         value=value,
         std_error=error if one.signed else error * value,
         confidence_interval=(low, high),
@@ -193,27 +202,41 @@ def _along(axis: Array, gradients: Mapping[str, Array]) -> str | None:
 
 
 def _conditions(
-    estimates: Sequence[ParameterEstimate], combined: Sequence[CombinationEstimate]
-) -> list[str]:
-    """Symbols of what is at a bound and holds the others to where they are by that.
+    estimates: Sequence[ParameterEstimate],
+    combined: Sequence[CombinationEstimate],
+    gradients: Mapping[str, Array],
+    errors: Uncertainty,
+    released: Mapping[str, Array],
+) -> tuple[str, ...]:
+    """What holds others, that are determined, to where they are by its bound.
 
-    One that the runs know only with another leaves the rest alone, and so does a damper's knee
-    beyond all speeds of the runs.
+    One that drifts along what the runs leave open leaves the rest where it is.
     """
-    free = {name for one in combined for name in one.of}
-    return [
-        parameter(one.name).symbol
-        for one in estimates
-        if one.at_bound
-        and one.name not in free
-        and not (one.name.endswith("knee_speed") and one.free.at_upper(one.value))
-    ]
+    axes = np.eye(len(estimates))
+    known = [axes[k] for k, one in enumerate(estimates) if one.determined != "no"]
+    known += [gradients[one.name] for one in combined if one.determined != "no"]
+    return tuple(
+        name
+        for name, step in released.items()
+        if any(abs(float(g @ step)) > errors.quantile * errors.error_of(g) for g in known)
+    )
 
 
-def _of_parameters(classes: Mapping[str, Sequence[str]], conditions: Sequence[str]) -> list[str]:
-    where = "where its bound puts it" if len(conditions) == 1 else "where their bounds put them"
-    are = "is" if len(conditions) == 1 else "are"
-    held = f", if {_listed(conditions)} {are} {where}" if conditions else ""
+def _if_held(conditions: Sequence[str]) -> str:
+    """What is said after what is determined: ", if ... is where its bound puts it"."""
+    if not conditions:
+        return ""
+    one = len(conditions) == 1
+    where = "is where its bound puts it" if one else "are where their bounds put them"
+    return f", if {listed([_short(name) for name in conditions])} {where}"
+
+
+def _short(name: str) -> str:
+    """A parameter's symbol; what is found of a sensor keeps its name."""
+    return parameter(name).symbol if name in ALL_NAMES else name
+
+
+def _of_parameters(classes: Mapping[str, Sequence[str]], held: str) -> list[str]:
     wording = {
         "yes": f"Determined to better than 15 %{held}",
         "weakly": f"Determined weakly, to between 15 and 50 %{held}",
@@ -226,7 +249,7 @@ def _of_parameters(classes: Mapping[str, Sequence[str]], conditions: Sequence[st
     ]
 
 
-def _of_combination(one: CombinationEstimate, known: Sequence[str]) -> str:
+def _of_combination(one: CombinationEstimate, known: Sequence[str], held: bool) -> str:
     apart = [parameter(name).symbol for name in one.of if name not in known]
     low, high = one.confidence_interval
     half_width, unit = 0.5 * (high - low), after_number(one.unit)
@@ -235,11 +258,6 @@ def _of_combination(one: CombinationEstimate, known: Sequence[str]) -> str:
     else:
         told = f"{one.value:.4g}{unit} to {in_percent(half_width / abs(one.value))}"
     are = "are determined only together" if len(apart) > 1 else "is determined better"
-    return (
-        f"{_listed(apart)} {are}, as {one.symbol},"
-        f" the {one.label[0].lower()}{one.label[1:]}: {told}."
-    )
-
-
-def _listed(symbols: Sequence[str]) -> str:
-    return f"{', '.join(symbols[:-1])}{' and ' if symbols[1:] else ''}{symbols[-1]}"
+    told += ", on the same condition" if held else ""
+    label = f"{one.label[0].lower()}{one.label[1:]}"
+    return f"{listed(apart)} {are}, as {one.symbol}, the {label}: {told}."

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..spikes import despiked
+from ..units import listed
 
 Array = NDArray[np.float64]
 Histories = Mapping[str, Array]
@@ -154,7 +155,7 @@ def channel_faults(
             found[channel] = ChannelFaults(tuple(one for one in (sign, unit, dead) if one))
     if len(opposed) > 1:
         found[opposed[-1]].beside.append(
-            f"Since {' and '.join(opposed)} of run {run} run against the model together, it may "
+            f"Since {listed(opposed)} of run {run} run against the model together, it may "
             "rather be the wheel.*.z whose sign is wrong."
         )
     return found

@@ -213,6 +213,26 @@ def test_noise_of_the_inputs_too_leaves_the_front_bar_known_by_its_rate_at_the_w
     assert abs(rate.value - true) < 3 * rate.std_error
 
 
+def test_a_bound_that_bends_the_fit_is_the_condition_of_its_verdict():
+    """Oracle: without it the spring is found at its true value, so a bound below that is what moves
+    the rest, d_R by a quarter; the bar's bound, of which the runs know the rate at the wheels
+    alone, moves nothing."""
+    runs = [read_run(SAMPLES / f"twin/manoeuvre_{number}.csv") for number in (1, 2)]
+    spring, bar = "front.suspension.stiffness", "front.stabilizer_bar.stiffness"
+    true = CAR.value(spring)
+    start = CAR.with_values({spring: 0.75 * true})
+    bent = identify(Problem.build(start, runs, bounds={spring: (0.3 * true, 0.8 * true)}))
+    assert bent.verdict.conditions == (spring,)
+    assert "if K_F is where its bound puts it" in bent.verdict.sentences[0]
+    assert any(text.startswith(f"{spring} is at its upper") for text in bent.warnings)
+    assert any("holds others back; widen the bound" in text for text in bent.warnings)
+    narrow = identify(Problem.build(CAR, runs, start={bar: 16e3}, bounds={bar: (1e3, 18e3)}))
+    assert bar in [one.name for one in narrow.parameters if one.at_bound]
+    assert narrow.verdict.conditions == ()
+    found = {one.name: one for one in narrow.parameters}
+    assert abs(found[spring].value - true) < 4.0 * found[spring].std_error
+
+
 def test_a_standing_car_determines_nothing():
     """Sensor noise alone, stated too small: the fit finds what follows it least badly."""
     rng = np.random.default_rng(5)

@@ -31,14 +31,20 @@ def estimated(words=("weakly", "weakly"), names=NAMES, at_bound=False, car=CAR):
 
 
 def judged(
-    covariance, unknown=(), words=("weakly", "weakly"), names=NAMES, at_bound=False, car=CAR
+    covariance,
+    unknown=(),
+    words=("weakly", "weakly"),
+    names=NAMES,
+    at_bound=False,
+    car=CAR,
+    released=None,
 ):
     """The verdict on parameters with some covariance of their logarithms."""
     n = len(names)
     errors = Uncertainty(
         np.array(covariance), np.array(unknown).reshape(-1, n), quantile=2.0, alone=np.zeros(n)
     )
-    return verdict(estimated(words, names, at_bound, car), errors, car)
+    return verdict(estimated(words, names, at_bound, car), errors, car, released)
 
 
 def along(*directions):
@@ -95,13 +101,29 @@ def test_what_follows_from_a_combination_is_not_told_again():
 def test_a_wider_bound_is_no_remedy_for_what_only_a_combination_tells():
     """Where the runs know the rate alone, its parts may lie at any bound."""
     estimates = estimated(("no", "no"), at_bound=True)
-    [first, _] = bound_findings(estimates)
+    [first, _] = bound_findings(estimates, without_verdict(estimates))
     assert first.endswith("widen the bound or fix the parameter.")
     together = along((0.5, (2, 1)), (1e-4 / 5, (1, -2)))
-    combinations = judged(together, words=("no", "no"), at_bound=True).combinations
-    [first, _] = bound_findings(estimates, combinations)
+    found = judged(together, words=("no", "no"), at_bound=True)
+    [first, _] = bound_findings(estimates, found)
     assert f"only together with {DISTANCE}, as Ktor_F/d_F^2" in first
     assert "widen the bound" not in first
+    held = judged(together, words=("no", "no"), at_bound=True, released={BAR: np.array([0.2, 0.0])})
+    [first, _] = bound_findings(estimates, held)
+    assert "widen the bound" in first
+
+
+def test_what_is_not_free_is_not_told_of():
+    """With d_F known, K_F and Ktor_F alone make the wheel rate in roll."""
+    names = ("front.suspension.stiffness", BAR)
+    roll = NAMED["front.wheel_rate_in_roll"]
+    bar = 2.0 * CAR.value(BAR) / CAR.value(DISTANCE) ** 2
+    gradient = np.array([CAR.value(names[0]), bar]) / roll.value(CAR)
+    across = np.array([gradient[1], -gradient[0]])
+    found = judged(along((0.05, across), (1e-5, gradient)), words=("no", "no"), names=names)
+    [rate] = [one for one in found.combinations if one.name == roll.name]
+    assert rate.of == names
+    assert found.sentences[-1].startswith("K_F and Ktor_F are determined only together")
 
 
 def test_a_direction_that_no_run_moves_leaves_the_rate_known():
@@ -155,17 +177,29 @@ def test_a_parameter_at_its_bound_may_be_known_together_with_another():
     assert "front.bar_rate" in [one.name for one in found.combinations]
 
 
-def test_what_is_determined_next_to_a_bound_is_so_if_the_bound_is_right():
-    """A search that ended at a bound wanted to go on, and would have taken the others along; what
-    is known only together with another would not."""
-    apart, together = np.diag([1e-6, 0.04]), along((0.05, (2, 1)), (1e-4 / 5, (1, -2)))
-    found = judged(apart, words=("yes", "yes"), at_bound=True)
-    [sentence] = found.sentences
-    where = "if Ktor_F and d_F are where their bounds put them: Ktor_F, d_F."
-    assert sentence == f"Determined to better than 15 %, {where}"
-    for words in (("no", "yes"), ("no", "weakly")):
-        first = judged(together, words=words, at_bound=True).sentences[0]
-        assert "bound" not in first
+@pytest.mark.parametrize(
+    ("step", "held"),
+    [([0.5, 0.0], False), ([0.5, 0.0021], True), ([0.5, -0.0021], True)],
+)
+def test_what_is_determined_hangs_on_a_bound_that_would_move_it(step, held):
+    """Oracle: d_F is known to 2 x 0.001. Were the bar's bound further away, d_F would go by more
+    than that, or stay."""
+    apart = np.diag([0.09, 1e-6])
+    found = judged(apart, words=("no", "yes"), at_bound=True, released={BAR: np.array(step)})
+    assert found.conditions == ((BAR,) if held else ())
+    condition = ", if Ktor_F is where its bound puts it" if held else ""
+    assert found.sentences[0] == f"Determined to better than 15 %{condition}: d_F."
+
+
+def test_a_bound_along_the_valley_of_a_combination_holds_nothing():
+    """Oracle: Ktor/d^2 stays where ln Ktor goes by 2 and ln d by 1; it goes by 0.2 with Ktor alone,
+    and is known to 0.02."""
+    together = along((0.05, (2, 1)), (1e-4 / 5, (1, -2)))
+    for step, held in (([0.2, 0.1], ()), ([0.2, 0.0], (BAR,))):
+        released = {BAR: np.array(step)}
+        found = judged(together, words=("no", "no"), at_bound=True, released=released)
+        assert found.conditions == held
+        assert found.sentences[-1].endswith("on the same condition.") == bool(held)
 
 
 def test_independent_parameters_are_not_told_together():
@@ -244,3 +278,4 @@ def test_a_fit_without_errors_has_classes_alone():
     found = without_verdict([estimate])
     assert found.parameters == by_class([estimate]) == {"yes": (), "weakly": (), "no": (BAR,)}
     assert [found.combinations, found.directions, found.sentences] == [(), (), ()]
+    assert found.conditions == ()
