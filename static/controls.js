@@ -3,6 +3,7 @@
 // The truth is `values` of the store (SI); a slider shows it, clamped to its range. On each track
 // lie the baseline (a tick) and, after a fit, the 95 % interval of the identified value (a band).
 
+import { condition, DETERMINED, isConditional } from "./determined.js";
 import { $, capital, h, symbol } from "./dom.js";
 import { isKnown, span } from "./intervals.js";
 import { notice } from "./notices.js";
@@ -11,11 +12,6 @@ import * as units from "./units.js";
 
 const GROUPS = { front: "Front axle", rear: "Rear axle" };
 const THUMB = 14;
-export const DETERMINED = {
-  yes: "well determined",
-  weakly: "weakly determined",
-  no: "not determined",
-};
 const rows = new Map();
 let twoSlope = null;
 /** The number that was typed last, until a car with it has been simulated: {parameter, before}. */
@@ -336,6 +332,7 @@ function band(parts, estimate, factor, at, shown) {
   interval.style.left = at(low);
   interval.style.right = `calc(100% - ${at(high).slice(4)}`;
   interval.className = `interval ${estimate.determined}`;
+  const held = isConditional(estimate.determined, get("fit"));
   interval.classList.toggle("open-below", open[0]);
   interval.classList.toggle("open-above", open[1]);
   const half = (high - low) / 2;
@@ -344,8 +341,8 @@ function band(parts, estimate, factor, at, shown) {
     : open[0] ? `≤ ${units.number(high)}`
       : open[1] ? `≥ ${units.number(low)}`
         : half > Math.abs(value) ? "± >100 %" : `± ${units.number(half, 2)}`;
-  spread.className = `spread ${estimate.determined}`;
+  spread.className = `spread ${estimate.determined}${held ? " conditional" : ""}`;
   spread.title =
     `Identified ${units.withUnit(units.number(value), parameter.display_unit)}, 95 % interval ` +
-    `${span(said, factor)}; ${DETERMINED[estimate.determined]}`;
+    `${span(said, factor)}; ${DETERMINED[estimate.determined]}${held ? `, ${condition(get("fit"))}` : ""}`;
 }

@@ -1,15 +1,16 @@
 // What an identification found, and how far it is while it runs.
 
 import { percent, short } from "./comfort.js";
-import { DETERMINED, isOfThisCar } from "./controls.js";
+import { isOfThisCar } from "./controls.js";
 import { costChart } from "./cost.js";
+import { DETERMINED, mark, WORDS } from "./determined.js";
 import { $, breakable, capital, fileName, h, saveFile, symbol } from "./dom.js";
 import { span } from "./intervals.js";
 import { distinct, nameOf } from "./names.js";
 import * as sensors from "./sensors_form.js";
 import { get } from "./store.js";
 import * as units from "./units.js";
-import { combinations, summary, WORDS } from "./verdict.js";
+import { combinations, summary } from "./verdict.js";
 import { worded } from "./wording.js";
 
 const STATES = {
@@ -145,10 +146,10 @@ function estimates(result, profile) {
   return h("table", { className: "estimates" },
     h("thead", {}, h("tr", {}, columns.map(([text, className = ""]) =>
       h("th", { scope: "col", className }, text)))),
-    h("tbody", {}, result.parameters.map((one) => estimateRow(one, profile))));
+    h("tbody", {}, result.parameters.map((one) => estimateRow(one, result, profile))));
 }
 
-function estimateRow(estimate, profile) {
+function estimateRow(estimate, result, profile) {
   const row = units.parameter(estimate.name);
   const shown = (value, digits) => units.number(value * row.display_factor, digits);
   const interval = estimate.confidence_interval;
@@ -163,15 +164,16 @@ function estimateRow(estimate, profile) {
     h("td", { className: "span" }, span(interval, row.display_factor)),
     h("td", { className: "soft long" }, shown(estimate.start)),
     h("td", { className: "soft span bounds" }, bounds),
-    h("td", {}, h("span", {
-      className: `determined ${estimate.determined}`,
-      title: estimate.at_bound
-        ? `At its ${upper ? "upper" : "lower"} bound, so ${DETERMINED[estimate.determined]}. ${searched}`
-        : DETERMINED[estimate.determined],
-    }, estimate.at_bound ? `at ${upper ? "upper" : "lower"}` : WORDS[estimate.determined])),
+    h("td", {}, estimate.at_bound ? atBound(estimate, upper, searched) : mark(estimate.determined, result)),
     h("td", { className: "action" }, h("button", { type: "button", className: "profile-of",
       "aria-label": `Profile of ${row.label}`, title: "Profile: how the fit gets worse when this one is held elsewhere",
       on: { click: () => profile(estimate.name) } })));
+}
+
+function atBound({ determined }, upper, searched) {
+  const side = upper ? "upper" : "lower";
+  return h("span", { className: `determined ${determined}`,
+    title: `At its ${side} bound, so ${DETERMINED[determined]}. ${searched}` }, `at ${side}`);
 }
 
 /** Fit percent of every run, fitted or held out, in the channels that the fit compares. */

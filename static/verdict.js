@@ -1,11 +1,11 @@
 // What the runs of a fit determine: in sentences, as combinations, and along which directions not.
 
+import { isConditional, mark, WORDS } from "./determined.js";
 import { h } from "./dom.js";
 import { combinationRow, formula, symbolOf } from "./formula.js";
 import { share, span } from "./intervals.js";
 import * as units from "./units.js";
 
-export const WORDS = { yes: "well", weakly: "weakly", no: "not" };
 /** Half-width from which a direction is shown, and of how many at most. */
 const WIDE = 0.15;
 const MOST_DIRECTIONS = 4;
@@ -17,21 +17,24 @@ const MOST_FACTOR = 1000;
 const APART = 3;
 
 /** How many parameters are well, weakly and not determined; `open()` shows the verdict. */
-export function summary({ verdict }, open) {
+export function summary(result, open) {
+  const { verdict } = result;
   return h("button", { type: "button", className: "link verdict-counts", title: "What these runs determine",
     on: { click: open } },
   Object.keys(WORDS).filter((word) => verdict.parameters[word].length).map((word) =>
-    h("span", { className: `determined ${word}` }, `${verdict.parameters[word].length} ${WORDS[word]}`)));
+    h("span", { className: `determined ${word}${isConditional(word, result) ? " conditional" : ""}` },
+      `${verdict.parameters[word].length} ${WORDS[word]}${isConditional(word, result) ? ", if …" : ""}`)));
 }
 
 /** The combinations that are better known than what they are made of, as a table; or nothing. */
-export function combinations({ verdict }) {
+export function combinations(result) {
+  const { verdict } = result;
   if (!verdict.combinations.length) return null;
   return h("table", { className: "combinations" },
     h("caption", {}, "Determined together, where the parameters are not known apart"),
     h("thead", {}, h("tr", {}, ["Combination", "Value", "95 %", "Unit", "95 % interval", "Determined"].map((text) =>
       h("th", { scope: "col", className: text === "Unit" ? "unit" : "" }, text)))),
-    h("tbody", {}, verdict.combinations.map((one) => combinationRow(one, { span, share, words: WORDS }))));
+    h("tbody", {}, verdict.combinations.map((one) => combinationRow(one, { span, share, mark: (word) => mark(word, result) }))));
 }
 
 /** The whole verdict. */
@@ -42,13 +45,15 @@ export function view(result) {
     h("div", { className: "fit-side scrolls" }, directions(result)));
 }
 
-function said({ verdict, outcome }) {
+function said(result) {
+  const { verdict, outcome } = result;
   if (!verdict.sentences.length) {
     return h("p", { className: "verdict-said" }, outcome, " So nothing is said of its parameters.");
   }
   const classes = Object.keys(WORDS).filter((word) => verdict.parameters[word].length);
   return h("ul", { className: "verdict-said" }, verdict.sentences.map((text, i) =>
-    h("li", { className: i < classes.length ? `determined ${classes[i]}` : "" },
+    h("li", { className: i < classes.length
+      ? `determined ${classes[i]}${isConditional(classes[i], result) ? " conditional" : ""}` : "" },
       h("span", {}, formula(text)))));
 }
 

@@ -158,7 +158,7 @@ def identify(
             *minima_findings(minima),
             *outlier_findings(problem, runs),
             *disagreements(priors, problem.free),
-            *whiteness_findings(tests),
+            *whiteness_findings(tests, [one.name for one in problem.free]),
             *bound_findings([*parameters, *sensors], judged),
         ]
     if converged:

@@ -11,11 +11,15 @@ once and takes no number of lags. Where the outputs are filtered, only frequenci
 leaves alone count.
 """
 
+from collections.abc import Collection
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import kstwobign
 
+from ..parameters import DAMPER_NAMES, parameter
 from ..simulation.rims_settings import RimsSettings
+from ..units import listed
 from .fit import Whiteness
 from .uncertainty import RunResiduals, bandwidth, effective_samples
 
@@ -68,8 +72,11 @@ def whiteness(
     return found
 
 
-def whiteness_findings(tests: tuple[Whiteness, ...]) -> list[str]:
-    """A sentence where residuals are far from white."""
+def whiteness_findings(tests: tuple[Whiteness, ...], free: Collection[str] = ()) -> list[str]:
+    """A sentence where residuals are far from white.
+
+    free : the parameters' names; what the model could still be given is what is not among them
+    """
     coloured = [
         one
         for one in tests
@@ -84,8 +91,11 @@ def whiteness_findings(tests: tuple[Whiteness, ...]) -> list[str]:
         where.setdefault(one.run, []).append(one.channel)
     named = "; ".join(f"{', '.join(channels)} of run {run}" for run, channels in where.items())
     effective = sum(one.effective_samples for one in tests)
+    kept = [parameter(name).symbol for name in DAMPER_NAMES if name not in free]
+    remedy = f" (two-slope dampers, if it has them: free {listed(kept)})" if kept else ""
+    samples = sum(one.samples for one in tests)
     return [
-        f"The residuals are not noise in {named}: the model misses something there, or noise of "
-        "the wheels or of a_x comes through the car, and may bias the parameters beyond their "
-        f"error bars; the {sum(one.samples for one in tests)} samples are worth {effective:.0f}."
+        f"The residuals are not noise in {named}: the model misses something there{remedy}, or "
+        "noise of the wheels or of a_x comes through the car, and may bias the parameters beyond "
+        f"their error bars; the {samples} samples are worth {effective:.0f}."
     ]

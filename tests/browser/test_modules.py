@@ -223,3 +223,17 @@ def test_a_logarithmic_axis_has_few_lines_at_powers_of_ten(visitor, low, high, l
 def test_an_end_that_stands_alone_is_not_rounded_beyond_its_value(visitor, interval, shown):
     """A value of 13.96 at its bound is not "from 14.0"."""
     assert in_module(visitor, "intervals", "return m.span(a[0], 1);", interval) == shown
+
+
+@pytest.mark.parametrize("held", [[], ["rear.stabilizer_bar.stiffness"], None])
+def test_what_a_bound_decides_is_not_marked_as_what_runs_determine(visitor, held):
+    """A fit of an earlier version tells no conditions."""
+    body = """const marked = ["yes", "no"].map((word) => m.mark(word, { verdict: a[0] }));
+        return marked.map(({ innerText, className, title }) => [innerText, className, title]);"""
+    well, not_at_all = in_module(visitor, "determined", body, {"conditions": held})
+    assert not_at_all == ["not", "determined no", "not determined"]
+    if held:
+        assert well[:2] == ["well, if …", "determined yes conditional"]
+        assert well[2].endswith("if rear stabilizer bar stiffness is where its bound puts it")
+    else:
+        assert well == ["well", "determined yes", "well determined"]

@@ -6,6 +6,7 @@ from ridetune.engine.identification.fit import Whiteness
 from ridetune.engine.identification.identify import Problem, identify
 from ridetune.engine.identification.uncertainty import RunResiduals
 from ridetune.engine.identification.whiteness import whiteness, whiteness_findings
+from ridetune.engine.parameters import DAMPER_NAMES
 from ridetune.engine.simulation.rims_settings import RimsSettings
 from scipy.signal import lfilter
 from scipy.stats import kstest
@@ -51,6 +52,8 @@ def test_slow_residuals_are_far_from_white_and_worth_few_samples():
     (sentence,) = whiteness_findings((found,))
     assert sentence.startswith("The residuals are not noise in chassis.z of run lap:")
     assert f"the 8000 samples are worth {found.effective_samples:.0f}." in sentence
+    assert "two-slope dampers, if it has them: free rho_F, v_F, rho_R and v_R" in sentence
+    assert "two-slope" not in whiteness_findings((found,), DAMPER_NAMES)[0]
 
 
 def test_filtered_white_noise_is_white_where_the_filter_leaves_it():
