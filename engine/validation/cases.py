@@ -36,7 +36,7 @@ def as_it_moved(run: Run, fit: Mapping[str, Any], fitted: str | None) -> Run:
     fit : as `fit_to_json` gives it
     fitted : what the fit calls the run; None where it has not seen it
     """
-    noise = {**run.noise, **noise_in(fit, fitted)}
+    noise = {**run.noise, **noise_in(fit, fitted, run.time)}
     return corrected(replace(run, noise=noise), readings_in(fit, fitted))
 
 
