@@ -23,7 +23,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, freqz_sos, sosfiltfilt
 
 Array = NDArray[np.float64]
 Band = tuple[float | None, float | None]
@@ -37,6 +37,10 @@ PAD_PERIODS = 3.0
 
 UNIFORM_TOLERANCE = 0.01
 """A record counts as uniform when no step differs from the mean by more than this share."""
+
+
+FREQUENCIES = 2**14
+"""Around the unit circle, at which a filter's gain is averaged."""
 
 
 def is_uniform(time: Array) -> bool:
@@ -102,6 +106,24 @@ def in_band(time: Array, values: Array, band: Band) -> Array:
     low, high = band
     values = smoothed(time, values, high)
     return values if low is None else high_pass(time, values, low)
+
+
+def noise_gain(time: Array, band: Band) -> float:
+    """Rms of white noise behind `in_band` over that before it, but for the ends of the record."""
+    low, high = band
+    rate = float((len(time) - 1) / (time[-1] - time[0]))
+    gain = np.ones(FREQUENCIES)
+    if high is not None and not too_coarse(1.0 / rate, high):
+        gain = _low_pass_gain(high, rate)
+    if low is not None:
+        gain = gain * (1.0 - _low_pass_gain(low, rate))
+    return float(np.sqrt(np.mean(gain**2)))
+
+
+def _low_pass_gain(cutoff: float, rate: float) -> Array:
+    """Amplitude behind both passes, around the unit circle."""
+    _, response = freqz_sos(_sections(cutoff, rate, ORDER), FREQUENCIES, whole=True)
+    return np.abs(response) ** 2
 
 
 def _low_pass_uniform(time: Array, values: Array, cutoff: float, order: int) -> Array:

@@ -30,11 +30,11 @@ export function view({ runs, result }) {
       (robust ? ` Outliers: samples beyond ${units.plain(result.loss_scale)} noises, which the loss discounts.` : "")));
 }
 
-/** The noise in force, and whether it was found. */
+/** The noise in force, and where it is from. */
 function noise(channel, { noise: held, noise_source: source }) {
   const { display_factor: factor, display_unit: unit } = units.channel(channel);
   const text = `${units.plain(held[channel] * factor, 2)} ${unit}`;
-  return source?.[channel] === "fitted" ? `${text}, fitted` : text;
+  return source?.[channel] ? `${text}, ${source[channel]}` : text;
 }
 
 function row(one, run, result, robust) {

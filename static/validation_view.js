@@ -110,9 +110,9 @@ function covered({ runs }) {
         h("th", { scope: "row" }, `${run.name}, ${ROLES[run.role]}`), h("td", {}, MODES[one.mode]),
         OUTPUTS.map((name) => h("td", {}, share(one.scores[name]))))))),
     h("p", { className: "hint" }, "Share of the samples that lie within the 95 % band of the 8-DOF prediction by the " +
-      "errors of the fit, widened by 1.96 times the channel’s noise. It is about 95 % where model, errors and " +
-      "noise are right, less where the model misses something, and more where the noise is stated too large or " +
-      "filtered."),
+      "errors of the fit, widened by 1.96 times what the output filter leaves of the channel’s noise, were it white. " +
+      "It is about 95 % where model, errors and noise are right, less where the model misses something or filtered " +
+      "noise is slow, and more where the noise is stated too large."),
   ];
 }
 

@@ -33,6 +33,13 @@ def test_links_lead_somewhere(page):
         assert target.startswith("http://127.0.0.1") or (page.parent / target).exists(), target
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_every_row_is_in_a_table(page):
+    """Oracle: GitHub Flavored Markdown, in which a table is a head, a line of dashes and rows."""
+    for block in re.findall(r"(?:^\|.*\n?)+", page.read_text(), re.MULTILINE):
+        assert re.match(r".*\n\|( *:?-+:? *\|)+$", block, re.MULTILINE), block
+
+
 def test_every_channel_is_in_the_table():
     rows = re.findall(r"^\| `(\S+)` \| (.+?) \|.+\|.+\|$", CONVENTIONS, re.MULTILINE)
     assert rows == [(info.name, info.unit) for info in CHANNEL_KINDS]

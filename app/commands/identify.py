@@ -4,8 +4,9 @@ import json
 import math
 import sys
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
+from ...engine.channels import OUTPUT_CHANNELS
 from ...engine.identification.fit import Fit, Progress, Stage
 from ...engine.identification.fit_file import fit_to_json, profile_to_json
 from ...engine.identification.identify import identify as fit_to_runs
@@ -44,7 +45,7 @@ def identify(options: Namespace) -> None:
     vehicle = find_vehicle(options.vehicle)
     under = find_mappings(options.mapping, options.runs)
     runs = read_runs(options.runs, options.braking or (), under, noise=noise)
-    problem = asked(options, vehicle, runs)
+    problem = asked(options, vehicle, runs, noise)
     profiled = [parameter(name).name for name in options.profile or ()]
     require_free(problem, profiled)
     fit = fitted(options, problem)
@@ -58,8 +59,13 @@ def identify(options: Namespace) -> None:
         write_file(options.output, json.dumps(told, indent=2) + "\n")
 
 
-def asked(options: Namespace, vehicle: Vehicle, runs: Sequence[Run]) -> Problem:
-    """What the options ask to be fitted to some runs."""
+def asked(
+    options: Namespace, vehicle: Vehicle, runs: Sequence[Run], noise: Mapping[str, float]
+) -> Problem:
+    """What the options ask to be fitted to some runs.
+
+    noise : that --noise gives, of channels that are compared and others
+    """
     return Problem.build(
         vehicle,
         runs,
@@ -67,6 +73,7 @@ def asked(options: Namespace, vehicle: Vehicle, runs: Sequence[Run]) -> Problem:
         options.fixed or None,
         bounds=bounds(options.bounds),
         start=start_values(options.start),
+        noise={name: one for name, one in noise.items() if name in OUTPUT_CHANNELS},
         traction=options.traction or "exact",
         settings=rims_settings(options),
         loss=loss(options),

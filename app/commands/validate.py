@@ -49,7 +49,7 @@ def validate(options: Namespace) -> None:
     runs = read_runs(paths, options.braking or (), under, noise=noise)
     cases = _cases(runs, len(options.runs), _manoeuvres(options.manoeuvre, paths))
     check_cases(cases)
-    fit = fitted(options, asked(options, vehicle, runs[: len(options.runs)]))
+    fit = fitted(options, asked(options, vehicle, runs[: len(options.runs)], noise))
     print_fit(fit)
     found = fit_to_json(fit)
     validation = predict(

@@ -15,6 +15,7 @@ from ..run_notes import DEFAULT_NOISE
 from ..simulation.rims import RimsInputs, filtered_outputs, prepare
 from ..simulation.rims_settings import RimsSettings
 from ..vehicle import Vehicle
+from .noise_source import NoiseSource
 from .sensing import corrected, where_driven
 from .sensor_model import SensorModel
 
@@ -36,14 +37,14 @@ class ComparedRun:
 
     measured : channel -> (samples,) as read, through the output filter
     noise : channel -> standard deviation of what is read, SI
-    noise_source : channel -> where that is from: "stated", "default" or "fitted"
+    noise_source : channel -> where that is from
     """
 
     name: str
     inputs: RimsInputs
     measured: Mapping[str, Array]
     noise: Mapping[str, float]
-    noise_source: Mapping[str, str]
+    noise_source: Mapping[str, NoiseSource]
 
 
 def compared_runs(
@@ -86,6 +87,7 @@ def compared_runs(
         channel: deviation * abs(sensors.reading(channel).gain)
         for channel, deviation in DEFAULT_NOISE.items()
     }
+    typed = {**noise, **sensors.noise()}
     found = []
     for name, run in zip(names, runs, strict=True):
         chosen = outputs.get(name) if isinstance(outputs, Mapping) else outputs
@@ -102,23 +104,29 @@ def compared_runs(
                 raise ProblemError(
                     f"Run {name} has gaps (not a number) in {channel}; leave the channel out."
                 )
-        stated = {**run.noise, **noise, **sensors.noise()}
+        told = defaults | dict(run.noise) | typed
         found.append(
             ComparedRun(
                 name,
                 prepare(corrected(run, readings), vehicle, settings, unzeroed=sensors.unzeroed),
                 compared,
-                {channel: float((defaults | stated)[channel]) for channel in compared},
-                {channel: "stated" if channel in stated else "default" for channel in compared},
+                {channel: float(told[channel]) for channel in compared},
+                {channel: _source(channel, run, typed) for channel in compared},
             )
         )
     return tuple(found)
 
 
+def _source(channel: str, run: Run, typed: Mapping[str, float]) -> NoiseSource:
+    if channel in typed:
+        return "typed"
+    return "stated" if channel in run.noise else "default"
+
+
 def require_motion(runs: Sequence[Run], compared: Sequence[ComparedRun]) -> None:
     """Raise ProblemError where no channel moves beyond its noise."""
     if not any(
-        _moves(run, channel, seen.noise[channel], seen.noise_source[channel] == "stated")
+        _moves(run, channel, seen.noise[channel], seen.noise_source[channel] != "default")
         for run, seen in zip(runs, compared, strict=True)
         for channel in seen.measured
     ):

@@ -12,6 +12,7 @@ from ..simulation.rims_settings import RimsSettings
 from ..step_record import StepRecord
 from ..vehicle import Vehicle
 from .loss import Loss
+from .noise_source import NoiseSource
 from .uncertainty import Uncertainty
 from .variables import FreeParameter
 
@@ -233,7 +234,7 @@ class FittedRun:
     """What was compared in one run, SI.
 
     noise : in force, by channel
-    noise_source : by channel, where that is from: "stated", "default" or "fitted"
+    noise_source : by channel, where that is from
     discounted : samples beyond the scale of the loss, by channel; none where it is linear
     braking : (begin, end) where the car was taken to brake, s
     conditioning : what made its channels of those that were recorded
@@ -242,7 +243,7 @@ class FittedRun:
     name: str
     samples: int
     noise: Mapping[str, float]
-    noise_source: Mapping[str, str]
+    noise_source: Mapping[str, NoiseSource]
     discounted: Mapping[str, int]
     braking: tuple[Interval, ...]
     conditioning: tuple[StepRecord, ...] = ()

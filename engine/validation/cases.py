@@ -9,6 +9,7 @@ import numpy as np
 from ..channels import OUTPUT_CHANNELS
 from ..errors import ManoeuvreError, ProblemError
 from ..identification.compared_runs import distinct_names, same_data
+from ..identification.noise_source import noise_in
 from ..identification.sensing import corrected
 from ..identification.sensor_model import readings_in
 from ..manoeuvre import Manoeuvre
@@ -29,20 +30,14 @@ class Case:
 
 
 def as_it_moved(run: Run, fit: Mapping[str, Any], fitted: str | None) -> Run:
-    """A run with the motion behind what its sensors read, and with the noise that was found, as a
-    fit knows them.
+    """A run with the motion behind what its sensors read, and with their noise, as a fit knows
+    them.
 
     fit : as `fit_to_json` gives it
     fitted : what the fit calls the run; None where it has not seen it
     """
-    seen = [one for one in fit["runs"] if fitted in (None, one["name"])]
-    noise = {
-        channel: one["noise"][channel]
-        for one in seen
-        for channel, source in one.get("noise_source", {}).items()
-        if source == "fitted"
-    }
-    return corrected(replace(run, noise={**run.noise, **noise}), readings_in(fit, fitted))
+    noise = {**run.noise, **noise_in(fit, fitted, run.time)}
+    return corrected(replace(run, noise=noise), readings_in(fit, fitted))
 
 
 def another_car(run: Run, vehicle: Vehicle) -> list[str]:

@@ -11,6 +11,7 @@ from scipy.stats import norm
 
 from ..channels import OUTPUT_CHANNELS
 from ..errors import RideError
+from ..filters import noise_gain
 from ..identification.bands import bands
 from ..identification.kept_fit import KeptFit
 from ..identification.uncertainty import CONFIDENCE
@@ -104,6 +105,7 @@ def predict(
     except RideError as error:
         return Prediction(mode, model, None, failure=str(error))
     run, noise = found.run, {**DEFAULT_NOISE, **case.run.noise}
+    passed = noise_gain(case.run.time, driver.settings.output_band)
     scores = {
         name: Score(
             fit_percent(measured[name], run[name]),
@@ -111,7 +113,7 @@ def predict(
             rate(run.time, measured[name], run[name]),
             None
             if name not in within
-            else coverage(measured[name], run[name], within[name], noise[name]),
+            else coverage(measured[name], run[name], within[name], passed * noise[name]),
         )
         for name in OUTPUT_CHANNELS
         if name in measured and name in run

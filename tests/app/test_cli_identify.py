@@ -221,8 +221,21 @@ def test_sensors_are_identified_and_told(folder, driven, capsys):
     [seen] = fit["runs"]
     assert seen["noise_source"]["chassis.z"] == "fitted"
     assert seen["noise"]["chassis.z"] == pytest.approx(1e-3, rel=0.1)
+    assert seen["noise_source"]["chassis.pitch"] == "typed"
     assert seen["noise"]["chassis.pitch"] == 0.001
     assert main(["advise", "lap.csv", "--vehicle", "fit.json", "--candidates", "brake-54"]) == 0
+
+
+def test_a_file_of_noise_is_typed_for_all_runs(folder, driven, capsys):
+    """Oracle: the file, which may tell of channels that are not compared."""
+    (folder / "noise.toml").write_text("noise.chassis.roll = 0.002\nnoise.wheel.fl.z = 0.001\n")
+    command = ["identify", str(driven), "--vehicle", "paper", "--noise", "noise.toml"]
+    assert main([*command, "--free", "K_F", "-o", "fit.json"]) == 0
+    [seen] = json.loads((folder / "fit.json").read_text())["runs"]
+    assert seen["noise"]["chassis.roll"] == 0.002
+    assert [seen["noise_source"][f"chassis.{one}"] for one in ("z", "roll")] == ["default", "typed"]
+    told = refused(capsys, *command, "--sensor", "chassis.roll.noise=0.001")
+    assert "stated twice, by itself and as sensor.chassis.roll.noise" in told
 
 
 @pytest.mark.parametrize(

@@ -161,6 +161,10 @@ def test_noise_is_typed_or_stated_or_the_default(visitor):
     with visitor.page.expect_request("**/identifications") as sent:
         visitor.click("#start")
     assert sent.value.post_data_json["noise"] == {"chassis.roll": pytest.approx(radians(0.1))}
+    visitor.until("ridetune.state('fit') !== null", 120)
+    visitor.click("#fit-residuals")
+    shown = visitor.element(".whiteness .channel .span").all_inner_texts()
+    assert shown == ["2 mm, stated", "0.02 deg, default", "0.1 deg, typed"]
 
 
 def test_what_was_driven_is_told_by_the_file_beside_a_recording(visitor):

@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
 from ridetune.engine.filters import (
     ORDER,
@@ -6,6 +7,7 @@ from ridetune.engine.filters import (
     in_band,
     is_uniform,
     low_pass,
+    noise_gain,
     smoothed,
     too_coarse,
 )
@@ -91,3 +93,27 @@ def test_a_band_without_ends_is_everything():
     time = np.arange(0.0, 2.0, STEP)
     values = np.sin(30.0 * time)
     assert in_band(time, values, (None, None)) is values
+
+
+@pytest.mark.parametrize(
+    ("band", "width"), [((None, 3.0), 3.0), ((0.5, None), 100.0), ((0.5, 3.0), 2.5)]
+)
+def test_noise_behind_a_filter_is_told_from_that_before(band, width):
+    """Oracle: white noise through the filter; in `width` Hz T seconds of it are worth 2 T width
+    samples, so that its rms scatters by 1 / sqrt(4 T width): four times."""
+    noise, time = 3.0, STEP * np.arange(400_000)
+    values = np.random.default_rng(5).normal(scale=noise, size=len(time))
+    found = np.sqrt(np.mean(in_band(time, values, band) ** 2))
+    scatter = 1.0 / np.sqrt(4.0 * time[-1] * width)
+    assert_allclose(noise * noise_gain(time, band), found, rtol=4.0 * scatter)
+
+
+def test_the_noise_that_a_low_pass_leaves_is_that_of_the_closed_form():
+    """Oracle: the integral of 1 / (1 + x^6)^2 over x >= 0, (5/6) (pi/6) / sin(pi/6), of the share
+    of the cutoff in the Nyquist frequency; the bilinear transform moves 1 Hz by (pi / 200)^2 / 3
+    of it."""
+    time = STEP * np.arange(1000)
+    share = 5.0 / 6.0 * (np.pi / 6.0) / np.sin(np.pi / 6.0) * 1.0 / 100.0
+    assert_allclose(noise_gain(time, (None, 1.0)) ** 2, share, rtol=1e-3)
+    assert noise_gain(time, (None, None)) == 1.0
+    assert noise_gain(time[::5], (None, CUTOFF)) == 1.0  # too coarse to be filtered

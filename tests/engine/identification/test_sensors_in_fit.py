@@ -341,7 +341,7 @@ def test_noise_is_found_to_its_scatter():
     stated = {name: {"noise": noise} for name, noise in seen.noise.items()}
     again = Problem.build(stand_in.REFERENCE, [run], start=ELSEWHERE, sensors=stated)
     other = identify(again, simulate=stand_in.simulate)
-    assert set(other.runs[0].noise_source.values()) == {"stated"}
+    assert set(other.runs[0].noise_source.values()) == {"typed"}
     for one, same in zip(found.parameters, other.parameters, strict=True):
         assert one.value == pytest.approx(same.value, rel=1e-5)
 
@@ -382,7 +382,7 @@ def test_a_fit_tells_of_its_sensors_as_data():
     assert data["runs"][0]["noise_source"] == {
         "chassis.z": "default",
         "chassis.pitch": "default",
-        "chassis.roll": "stated",
+        "chassis.roll": "typed",
     }
     assert np.shape(data["covariance"]) == (12, 12)
 
