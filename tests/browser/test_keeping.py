@@ -3,6 +3,12 @@
 import json
 
 import pytest
+from ridetune.app.schemas import SearchForm
+from ridetune.engine.simulation.rims_settings import (
+    HIGHEST_HIGHPASS,
+    LOWEST_CUTOFF,
+    LOWEST_HIGHPASS,
+)
 
 from .conftest import Visitor, add_file, short_run
 from .test_preparation import change
@@ -88,6 +94,30 @@ def test_a_refused_part_is_told_and_holds_no_other_back(visitor):
     visitor.wait(lambda: message.is_visible(), "it is told again")
     change(visitor, "Upper bound of Front spring stiffness", "50")
     visitor.wait(lambda: not message.is_visible(), "what the service has already is no news")
+
+
+def test_fields_have_the_limits_of_the_service(visitor):
+    """Oracle: the limits of requests; what is beyond is told in its field and does not go out."""
+    schema = SearchForm.model_json_schema()["properties"]
+    opened(visitor, "How recordings drive", "Search:")
+
+    def ends(field):
+        return [
+            field.get_attribute(end) and float(field.get_attribute(end)) for end in ("min", "max")
+        ]
+
+    for name in ("starts", "seed", "loss_scale"):
+        stated = [float(schema[name][end]) for end in ("minimum", "maximum")]
+        assert ends(visitor.element(f"#search-{name}")) == stated
+    fields = visitor.element(".frequency").all()
+    assert list(map(ends, fields)) == [[LOWEST_CUTOFF, None]] * 3 + [
+        [LOWEST_HIGHPASS, HIGHEST_HIGHPASS]
+    ]
+    change(visitor, "Low-pass of the wheel centres", "0.2")
+    assert not fields[1].evaluate("(field) => field.validity.valid")
+    assert visitor.look("ridetune.state('rimsSettings').rim_cutoff_hz") == 50
+    visitor.click("#start")
+    assert visitor.look("ridetune.job()") is None
 
 
 def test_what_is_kept_last_is_what_was_set_last(visitor):
