@@ -71,6 +71,23 @@ def test_the_same_drive_under_another_name_is_remarked(visitor):
     assert other["same_data_as"] is None
 
 
+def test_the_same_bytes_under_another_mapping_are_other_data(visitor):
+    """A body that goes down is another than one that goes up; turned back, they are the same."""
+    data = short_recording()
+    first, second, third = (visitor.upload(data, f"{name}.csv").json() for name in "abc")
+    path = f"/measurements/{second['id']}"
+    mapping = visitor.get(f"{path}/columns").json()["proposed"]
+    for one in mapping["columns"]:
+        one["unit"] = {"time": "s", "chassis.a_x": "m/s^2"}.get(one["column"], "mm")
+    [height] = [one for one in mapping["columns"] if one["channel"] == "chassis.z"]
+    height["sign"] = -1
+    turned = visitor.put(f"{path}/mapping", json=mapping).json()
+    assert (turned["same_data_as"], turned["remarks"]) == (None, [])
+    assert visitor.get(f"/measurements/{third['id']}").json()["same_data_as"] == first["id"]
+    height["sign"] = 1
+    assert visitor.put(f"{path}/mapping", json=mapping).json()["same_data_as"] == first["id"]
+
+
 def test_a_bare_body_is_an_upload_too(visitor):
     data = short_recording()
     reply = visitor.post("/measurements?name=bare.csv", content=data)
