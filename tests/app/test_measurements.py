@@ -112,7 +112,7 @@ def test_what_an_identification_lacks_is_listed(visitor):
     assert found["missing"] == ["chassis.a_x"]
 
 
-def test_the_histories_come_as_binary_json_and_csv(visitor):
+def test_the_histories_come_as_binary_and_json_and_whole_as_csv(visitor):
     sample = visitor.get("/measurements").json()[0]
     path = f"/measurements/{sample['id']}/frames?channels=chassis.z,wheel.fl.z&max_samples=500"
     binary = visitor.get(path, headers={"Accept": "application/vnd.ridetune.frames"})
@@ -122,7 +122,9 @@ def test_the_histories_come_as_binary_json_and_csv(visitor):
     assert head["samples"] <= 500
     shown = visitor.get(path).json()
     assert shown["values"]["chassis.z"] == pytest.approx(values["chassis.z"].tolist(), abs=1e-6)
-    csv = visitor.get(path, headers={"Accept": "text/csv"})
+    assert visitor.get(path, headers={"Accept": "text/csv"}).status_code == 406
+    csv = visitor.get(f"/measurements/{sample['id']}/run.csv")
+    assert csv.headers["content-type"] == "text/csv; charset=utf-8"
     assert csv.text.startswith("time [s],")
     assert len(csv.text.splitlines()) == sample["samples"] + 1
 
