@@ -138,7 +138,8 @@ def _note(services: Services, sid: str, mid: str, received: Upload) -> Measureme
     if not (done or notes.vehicle or noise.keys() & set(OUTPUT_CHANNELS)):
         raise MeasurementError(
             f"{received.name} states no noise of {', '.join(OUTPUT_CHANNELS)}; write [noise] and "
-            'below it lines such as "chassis.z" = 0.0005, in SI.'
+            'below it lines such as "chassis.z" = 0.0005, in SI, or vehicle = and the name of the '
+            "car."
         )
     told = {**kept.summary, "vehicle": notes.vehicle or kept.summary.get("vehicle")}
     if kept.summary.get("needs_mapping"):

@@ -162,6 +162,7 @@ def test_notes_state_the_noise_of_a_recording(visitor):
     [
         (b"[noise]\n", "lap.toml states no noise of chassis.z, chassis.pitch, chassis.roll"),
         (b'[noise]\n"wheel.fl.z" = 1e-3\n', "lap.toml states no noise of chassis.z"),
+        (b'description = "wet"\n', "or vehicle = and the name of the car"),
         (b'[noise]\n"chassis.z" = -1\n', "give a positive number in m"),
         (b"time [s],chassis.z [mm]\n0,1\n", "lap.toml: not valid TOML"),
     ],
