@@ -26,11 +26,13 @@ from .errors import NotAcceptable
 Decimate = Literal["extremes", "stride"]
 Form = Literal["binary", "json", "csv"]
 
-MEDIA_TYPES: dict[str, Form] = {
+HISTORIES: dict[str, Form] = {
     "application/vnd.ridetune.frames": "binary",
     "application/json": "json",
-    "text/csv": "csv",
 }
+"""Forms that can be thinned out."""
+
+MEDIA_TYPES: dict[str, Form] = {**HISTORIES, "text/csv": "csv"}
 
 SIDES = ("lower", "upper")
 """Ends of a band."""
@@ -156,16 +158,16 @@ def clean(value: Any) -> Any:
     return value
 
 
-def form_of(accept: str | None) -> Form:
+def form_of(accept: str | None, forms: Mapping[str, Form] = MEDIA_TYPES) -> Form:
     """Which form an Accept header asks for: the first it names that there is, JSON by default."""
     if not accept:
         return "json"
     for choice in accept.split(","):
         name = choice.partition(";")[0].strip().lower()
-        if name in MEDIA_TYPES:
-            return MEDIA_TYPES[name]
+        if name in forms:
+            return forms[name]
         if name in ("*/*", "application/*"):
             return "json"
-        if name == "text/*":
+        if name == "text/*" and "text/csv" in forms:
             return "csv"
-    raise NotAcceptable(f"The reply can be had as {', '.join(MEDIA_TYPES)}; ask for one of them.")
+    raise NotAcceptable(f"The reply can be had as {', '.join(forms)}; ask for one of them.")

@@ -33,6 +33,9 @@ READING = ("GET", "HEAD", "OPTIONS")
 DRAINED_BODIES = 10
 MULTIPART_ENVELOPE = 65_536
 
+SETUP_BYTES = 64_000
+"""A change of a set-up, which names some dozens of things."""
+
 
 class Guard:
     """ASGI middleware around the whole service."""
@@ -62,7 +65,7 @@ class Guard:
         limit = self._body_limit(scope)
         too_large = (
             f"The body is over the limit of {limit / 1e6:.3g} MB; send a smaller one, "
-            "a measurement in several files."
+            "a measurement in several files, a set-up part by part."
         )
         if _announced(scope) > limit:
             await _drain(receive, DRAINED_BODIES * limit)
@@ -73,6 +76,8 @@ class Guard:
     def _body_limit(self, scope: Scope) -> int:
         if scope["method"] == "POST" and scope["path"].endswith("/measurements"):
             return self.limits.upload_bytes + MULTIPART_ENVELOPE
+        if scope["method"] == "PATCH" and scope["path"].endswith("/setup"):
+            return min(SETUP_BYTES, self.limits.body_bytes)
         return self.limits.body_bytes
 
 

@@ -46,12 +46,25 @@ def _shown(kept: Measurement, of_session: Sequence[Measurement]) -> dict[str, An
     }
 
 
-def _first_of_same_data(kept: Measurement, of_session: Sequence[Measurement]) -> Measurement | None:
-    """The oldest other recording with the same bytes or, however they are written, samples."""
-    data = kept.summary.get("data_sha256")
+def data_keys(of_session: Sequence[Measurement]) -> dict[str, str]:
+    """What stands for the data of each recording, by id: the same for those that hold the same.
+
+    That is its samples, under its mapping and however its file writes them. Where they are not
+    known, since the columns have no mapping yet or an earlier service took the file, those of the
+    oldest recording with the same bytes, else the bytes.
+    """
+    by_bytes: dict[str, str] = {}
     for one in of_session:
-        if one.id == kept.id:
-            break
-        if one.sha256 == kept.sha256 or (data and one.summary.get("data_sha256") == data):
-            return one
-    return None
+        if samples := one.summary.get("data_sha256"):
+            by_bytes.setdefault(one.sha256, samples)
+    return {
+        one.id: one.summary.get("data_sha256") or by_bytes.get(one.sha256, one.sha256)
+        for one in of_session
+    }
+
+
+def _first_of_same_data(kept: Measurement, of_session: Sequence[Measurement]) -> Measurement | None:
+    """The oldest recording with the same data, unless it is this one."""
+    keys = data_keys(of_session)
+    first = next(one for one in of_session if keys[one.id] == keys[kept.id])
+    return None if first.id == kept.id else first

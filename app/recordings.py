@@ -168,8 +168,7 @@ class Recordings:
 
     def summed_up(self, measurement: Measurement) -> dict[str, Any]:
         """Summary of a measurement as it is used."""
-        found = summary(self.run(measurement), measurement.mapping)
-        return {**found, "data_sha256": _digest(self.raw(measurement))}
+        return summary(self.run(measurement), measurement.mapping, self.raw(measurement))
 
     @contextmanager
     def _opened(self, path: Path, name: str) -> "Iterator[ChildTable]":
@@ -285,10 +284,13 @@ def with_braking(run: Run, intervals: Iterable[tuple[float, float]] | None) -> R
     return run if intervals is None else replace(run, braking=tuple(map(tuple, intervals)))
 
 
-def summary(run: Run, mapping: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def summary(
+    run: Run, mapping: Mapping[str, Any] | None = None, raw: Run | None = None
+) -> dict[str, Any]:
     """What a person wants to know of a recording before using it.
 
     mapping : that of its columns, whose signs are looked at; None where they go by their names
+    raw : the recording before anything was done to it, where that is another
     """
     from ..engine.measurement import missing_for_identification
 
@@ -310,7 +312,7 @@ def summary(run: Run, mapping: Mapping[str, Any] | None = None) -> dict[str, Any
         "usable_for_identification": not missing,
         "missing": missing,
         "sign_suggestions": suggestions,
-        "data_sha256": _digest(run),
+        "data_sha256": _digest(raw or run),
         "vehicle": run.vehicle or None,
     }
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Request, Response
-from fastapi.responses import FileResponse
+from fastapi.responses import FileResponse, StreamingResponse
 from starlette.concurrency import run_in_threadpool
 
 from ..engine.channels import OUTPUT_CHANNELS
@@ -16,7 +16,7 @@ from . import frames
 from .access import SessionId
 from .downloads import saved_as
 from .measurement_view import measurement_to_json, measurements_to_json
-from .routes_simulations import FORMS, csv_reply, frames_reply
+from .routes_simulations import csv_reply, described, frames_reply
 from .services import Services, Shared
 from .store import Measurement
 from .strict_json import StrictRoute
@@ -26,6 +26,9 @@ router = APIRouter(
     prefix="/api/sessions/{sid}/measurements", tags=["measurements"], route_class=StrictRoute
 )
 
+Conditioned = Annotated[
+    bool, Query(description="False for the recording before anything is done to it.")
+]
 Recording = Annotated[Upload, Depends(receive("measurement.csv"))]
 Notes = Annotated[Upload, Depends(receive("notes.toml"))]
 Driven = Annotated[Upload, Depends(receive("manoeuvre.json"))]
@@ -55,7 +58,7 @@ def one(sid: SessionId, mid: str, services: Shared) -> dict[str, Any]:
     return measurement_to_json(services.store, sid, services.store.measurement(sid, mid))
 
 
-@router.get("/{mid}/frames", responses=FORMS, response_class=Response)
+@router.get("/{mid}/frames", responses=described(frames.HISTORIES), response_class=Response)
 async def histories(
     sid: SessionId,
     mid: str,
@@ -66,12 +69,10 @@ async def histories(
     ] = None,
     max_samples: Annotated[int | None, Query(ge=2, le=2_000_000)] = None,
     decimate: frames.Decimate = "extremes",
-    conditioned: Annotated[
-        bool, Query(description="False for the recording before anything is done to it.")
-    ] = True,
+    conditioned: Conditioned = True,
 ) -> Response:
-    """The recording's histories in SI: binary, JSON or CSV."""
-    form = frames.form_of(request.headers.get("accept"))
+    """The recording's histories in SI: binary or JSON."""
+    form = frames.form_of(request.headers.get("accept"), frames.HISTORIES)
     names = None if channels is None else [name for name in channels.split(",") if name]
     kept = services.store.measurement(sid, mid)
     if not conditioned:
@@ -79,8 +80,6 @@ async def histories(
 
     def shown() -> Response:
         run = services.recordings.run(kept)
-        if form == "csv":
-            return csv_reply(run)
         taken = frames.take(run, names, max_samples, decimate)
         head = {"mode": "measured", "name": run.name, "duration": run.duration}
         return frames_reply({**head, "warnings": list(run.warnings)}, taken, form)
@@ -91,17 +90,16 @@ async def histories(
     return await services.readers.run(sid, shown)
 
 
-@router.get("/{mid}/run.csv", response_class=Response)
-async def as_csv(sid: SessionId, mid: str, services: Shared) -> Response:
+@router.get("/{mid}/run.csv", response_class=StreamingResponse)
+async def as_csv(
+    sid: SessionId, mid: str, services: Shared, conditioned: Conditioned = True
+) -> Response:
     """The recording as it is used, in SI and by our channels' names, as a file."""
     kept = services.store.measurement(sid, mid)
-
-    def written() -> Response:
-        reply = csv_reply(services.recordings.run(kept))
-        reply.headers.update(saved_as(kept.name, "run.csv"))
-        return reply
-
-    return await services.readers.run(sid, written)
+    if not conditioned:
+        kept = replace(kept, conditioning=None)
+    run = await services.readers.run(sid, lambda: services.recordings.run(kept))
+    return csv_reply(run, saved_as(kept.name, "run.csv"))
 
 
 @router.get("/{mid}/run.toml", response_class=Response)
@@ -140,7 +138,8 @@ def _note(services: Services, sid: str, mid: str, received: Upload) -> Measureme
     if not (done or notes.vehicle or noise.keys() & set(OUTPUT_CHANNELS)):
         raise MeasurementError(
             f"{received.name} states no noise of {', '.join(OUTPUT_CHANNELS)}; write [noise] and "
-            'below it lines such as "chassis.z" = 0.0005, in SI.'
+            'below it lines such as "chassis.z" = 0.0005, in SI, or vehicle = and the name of the '
+            "car."
         )
     told = {**kept.summary, "vehicle": notes.vehicle or kept.summary.get("vehicle")}
     if kept.summary.get("needs_mapping"):

@@ -10,8 +10,9 @@ from .job_routes import all_to_json
 from .measurement_view import measurements_to_json
 from .routes_identifications import VIEW as IDENTIFICATION
 from .routes_sweeps import VIEW as SWEEP
-from .schemas import JsonObject, SetupForm
+from .schemas import JsonObject
 from .services import Shared
+from .setup_form import SetupForm
 from .strict_json import StrictRoute
 
 router = APIRouter(prefix="/api/sessions", tags=["sessions"], route_class=StrictRoute)
@@ -86,9 +87,7 @@ def setup(sid: SessionId, services: Shared) -> dict[str, Any] | None:
     return services.store.session(sid).setup
 
 
-@router.put("/{sid}/setup")
-def set_setup(sid: SessionId, services: Shared, body: SetupForm) -> dict[str, Any]:
-    """Replace it; what it names need not be there any more."""
-    kept = body.model_dump(mode="json")
-    services.store.set_setup(sid, kept)
-    return kept
+@router.patch("/{sid}/setup")
+def change_setup(sid: SessionId, services: Shared, body: SetupForm) -> dict[str, Any]:
+    """Change parts of it; what is told of a measurement goes with it."""
+    return services.store.setups.change(sid, body)

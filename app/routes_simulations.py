@@ -1,9 +1,10 @@
 """Interactive simulations of a session's car."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
-from fastapi.responses import JSONResponse
+from fastapi.responses import JSONResponse, StreamingResponse
 
 from . import frames
 from .access import SessionId
@@ -17,15 +18,18 @@ router = APIRouter(
     prefix="/api/sessions/{sid}/simulations", tags=["simulations"], route_class=StrictRoute
 )
 
-FORMS: dict[int | str, dict[str, Any]] = {
-    200: {
-        "description": "Head and histories; binary, JSON or CSV as the Accept header asks.",
-        "content": {name: {} for name in frames.MEDIA_TYPES},
+
+def described(forms: Mapping[str, frames.Form]) -> dict[int | str, dict[str, Any]]:
+    """How the description of the interface shows a reply in one of the forms."""
+    return {
+        200: {
+            "description": "Head and histories, in the form that the Accept header asks for.",
+            "content": {name: {} for name in forms},
+        }
     }
-}
 
 
-@router.post("", responses=FORMS, response_class=Response)
+@router.post("", responses=described(frames.MEDIA_TYPES), response_class=Response)
 async def simulate(
     sid: SessionId, services: Shared, body: SimulationRequest, request: Request
 ) -> Response:
@@ -65,8 +69,9 @@ def frames_reply(head: dict[str, Any], taken: frames.Frames, form: frames.Form) 
     return JSONResponse(frames.to_json(head, taken))
 
 
-def csv_reply(run: Any) -> Response:
-    """A run as the measurement file it would be."""
-    from ..engine.measurement import run_to_csv
+def csv_reply(run: Any, headers: Mapping[str, str] | None = None) -> Response:
+    """A run as the measurement file it would be, written while it is sent."""
+    from ..engine.measurement import csv_blocks
 
-    return Response(run_to_csv(run), media_type="text/csv; charset=utf-8")
+    # A generator that is not asynchronous is gone through in the thread pool.
+    return StreamingResponse(csv_blocks(run), headers=headers, media_type="text/csv; charset=utf-8")

@@ -333,30 +333,28 @@ SensorForm = Annotated[
 class SearchForm(WireForm):
     """How parameters are found, whichever they are and of whatever runs.
 
-    braking : by measurement, (begin, end) where the car brakes, s; for others what a_x shows
     starts, seed : points tried as starts, the told one and others between the bounds
     loss, loss_scale : how much outliers count, and from how many noises on they are ones
-    priors : by parameter its mean and standard deviation, known before the runs, SI
-    sensors : by channel what its sensor is known to do, SI, or "fit" for what is to be found:
-        delay, gain, bias, sign and noise
     fit_noise : find the noise of all compared channels for which `sensors` says none
     """
 
-    noise: Annotated[dict[Name, Number], Field(max_length=50)] = {}
     traction: Traction = "exact"
     settings: RimsSettingsForm = RimsSettingsForm()
-    braking: Annotated[dict[Name, Intervals], Field(max_length=20)] = {}
     starts: Annotated[Whole, Field(ge=1, le=MOST_STARTS)] = 1
     seed: Seed = 0
     loss: LossName = "linear"
     loss_scale: Annotated[Number, Field(ge=SMALLEST_SCALE, le=LARGEST_SCALE)] = DEFAULT_SCALE
-    priors: Annotated[dict[Name, tuple[Number, Number]], Field(max_length=50)] = {}
-    sensors: Annotated[dict[Name, SensorForm], Field(max_length=50)] = {}
     fit_noise: Flag = False
 
 
 class IdentificationRequest(SearchForm):
-    """Find parameters of the session's car (or of another start) from measurements."""
+    """Find parameters of the session's car (or of another start) from measurements.
+
+    braking : by measurement, (begin, end) where the car brakes, s; for others what a_x shows
+    priors : by parameter its mean and standard deviation, known before the runs, SI
+    sensors : by channel what its sensor is known to do, SI, or "fit" for what is to be found:
+        delay, gain, bias, sign and noise
+    """
 
     runs: Annotated[list[Name], Field(max_length=20)]
     vehicle: JsonObject | None = None
@@ -364,27 +362,8 @@ class IdentificationRequest(SearchForm):
     fixed: Names | None = None
     bounds: Annotated[dict[Name, tuple[Number, Number]], Field(max_length=50)] = {}
     start: Annotated[dict[Name, Number], Field(max_length=50)] = {}
+    noise: Annotated[dict[Name, Number], Field(max_length=50)] = {}
+    braking: Annotated[dict[Name, Intervals], Field(max_length=20)] = {}
+    priors: Annotated[dict[Name, tuple[Number, Number]], Field(max_length=50)] = {}
+    sensors: Annotated[dict[Name, SensorForm], Field(max_length=50)] = {}
     key: Name | None = None
-
-
-class RideForm(WireForm):
-    """What is on show: a measurement by its id, or a known manoeuvre by its key."""
-
-    kind: Literal["measurement", "manoeuvre"]
-    id: Name | None = None
-    key: Name | None = None
-
-
-class SetupForm(SearchForm):
-    """What the page will ask of the next identification.
-
-    use : by measurement; of others the page finds one
-    fixed : parameters that are not found
-    bounds : by parameter (lower, upper), null for the default
-    """
-
-    ride: RideForm | None = None
-    use: Annotated[dict[Name, Literal["fit", "hold_out", "leave_out"]], Field(max_length=1000)] = {}
-    fixed: Names | None = None
-    bounds: Annotated[dict[Name, tuple[Number | None, Number | None]], Field(max_length=50)] = {}
-    braking: Annotated[dict[Name, Intervals], Field(max_length=1000)] = {}

@@ -24,6 +24,7 @@ from .errors import Busy, Conflict, NotFound, Unavailable
 from .job_store import JobStore
 from .mapping_store import MappingStore
 from .settings import Limits
+from .setup_store import SetupStore
 from .tables import job_files, jobs, mappings, measurements, sessions, uploads
 
 SEEN_EVERY = 60.0
@@ -92,6 +93,7 @@ class Store:
             self.directory.close()
             raise
         self.jobs = JobStore(self.database, limits)
+        self.setups = SetupStore(self.database, limits)
         self.mappings = MappingStore(self.database, self._require_room)
         self._seen: dict[str, float] = {}
         self._originals = threading.Lock()
@@ -180,10 +182,6 @@ class Store:
     def set_baseline(self, session: str, vehicle: Mapping[str, Any]) -> None:
         """Replace the car it is compared with."""
         self._set(session, baseline=json.dumps(vehicle), used=True)
-
-    def set_setup(self, session: str, setup: Mapping[str, Any]) -> None:
-        """Replace what the next identification is told."""
-        self._set(session, setup=json.dumps(dict(setup)), used=True)
 
     def _set(self, session: str, **values: Any) -> None:
         with self.database.writing() as connection:

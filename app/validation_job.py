@@ -13,6 +13,7 @@ from .errors import InvalidRequest
 from .identification_job import check_budget, done
 from .job_store import Job
 from .jobs import Kind
+from .measurement_view import data_keys
 from .recordings import Recordings, as_stated, stated, with_braking
 from .schemas import ValidationRequest
 from .settings import Limits
@@ -70,19 +71,16 @@ def check_and_fill(
         geometry_from_json(request.geometry)
     check_budget(kept, fit["settings"]["step"], limits)
     check_cases(_cases(spec, _runs(spec, session, store, recordings)))
-    data = set(map(_data, kept))
+    of_session = store.measurements(session)
+    data = data_keys(of_session)
+    seen = {data[one.id] for one in kept}
     left_out = [
         one.name
-        for one in store.measurements(session)
-        if _data(one) not in data and one.summary["usable_for_identification"]
+        for one in of_session
+        if data[one.id] not in seen and one.summary["usable_for_identification"]
     ]
     recorded = [{"name": one.name, "sha256": one.sha256} for one in kept]
     return {**spec, "recorded": recorded, "left_out": left_out}
-
-
-def _data(kept: Measurement) -> str:
-    """What stands for a recording's data, however they are written."""
-    return kept.summary.get("data_sha256") or kept.sha256
 
 
 def _driven(request: ValidationRequest, kept: Sequence[Measurement]) -> dict[str, Any]:

@@ -6,7 +6,7 @@ may state noise and description (see `run_notes`). Which kinds of file are read 
 """
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
 from pathlib import Path
@@ -98,29 +98,48 @@ def parse_run(
         return named_run(table, noise or {}, "")
 
 
+BLOCK = 4096
+"""Samples that are written at once, so that the text of a long run is never in memory whole."""
+
+
 def write_run(run: Run, path: str | Path) -> None:
     """Write a run as CSV in SI; `read_run` returns its values to 11 digits, its time to 14."""
-    Path(path).write_text(run_to_csv(run), encoding="utf-8", newline="\n")
+    with Path(path).open("w", encoding="utf-8", newline="\n") as file:
+        file.writelines(csv_blocks(run))
 
 
 def run_to_csv(run: Run, units: Mapping[str, str] = MappingProxyType({})) -> str:
-    """A run as CSV text, one row a sample, columns in the table's order.
+    """A run as CSV text; `units` as of `csv_blocks`."""
+    return "".join(csv_blocks(run, units))
+
+
+def csv_blocks(run: Run, units: Mapping[str, str] = MappingProxyType({})) -> Iterator[str]:
+    """A run as CSV text, some lines at a time: a row a sample, columns in the table's order.
 
     units : by channel, of those that are not to be in SI
     """
-    shown = {name: in_unit(run, name, units) for name in ("time", *run.columns)}
-    titles = [f"{name} [{unit}]" for name, (_, unit) in shown.items()]
-    table = np.column_stack([values for values, _ in shown.values()])
+    names = ("time", *run.columns)
+    scales, shown = zip(*(_scale(name, units) for name in names), strict=True)
+    yield ",".join(f"{name} [{unit}]" for name, unit in zip(names, shown, strict=True)) + "\n"
+    columns = [run.time if name == "time" else run[name] for name in names]
     # A time counted from 1970 in seconds takes ten digits before the point.
-    row = ",".join(["%.15g"] + ["%.12g"] * len(run.columns))
-    return "\n".join([",".join(titles), *(row % tuple(values) for values in table.tolist()), ""])
+    row = ",".join(["%.15g"] + ["%.12g"] * len(run.columns)) + "\n"
+    for begin in range(0, len(run.time), BLOCK):
+        block = np.column_stack([values[begin : begin + BLOCK] for values in columns]) / scales
+        yield "".join(row % tuple(values) for values in block.tolist())
 
 
 def in_unit(run: Run, name: str, units: Mapping[str, str]) -> tuple[NDArray[np.float64], str]:
     """The time or a channel (n,) of a run in its unit, SI where none is told, and that unit."""
+    scale, unit = _scale(name, units)
+    return (run.time if name == "time" else run[name]) / scale, unit
+
+
+def _scale(name: str, units: Mapping[str, str]) -> tuple[float, str]:
+    """What one of a channel's unit is in SI, and that unit."""
     si = channel(name).unit
     unit = units.get(name, si)
-    return (run.time if name == "time" else run[name]) / to_si(unit, si)[0], unit
+    return to_si(unit, si)[0], unit
 
 
 def missing_for_identification(run: Run) -> tuple[str, ...]:

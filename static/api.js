@@ -108,10 +108,11 @@ export const rimsSettings = () => json("GET", "/api/rims-settings");
 
 // The session
 export const session = () => json("GET", base);
-/** Outlives the page, so that leaving it does not lose the last move. */
-export const saveVehicle = (vehicle) =>
-  json("PUT", `${base}/vehicle`, { body: vehicle, keepalive: true });
-export const saveSetup = (setup) => json("PUT", `${base}/setup`, { body: setup, keepalive: true });
+/** `leaving`: the request outlives the page, for which browsers take up to 64 KiB. */
+export const saveVehicle = (vehicle, leaving = false) =>
+  json("PUT", `${base}/vehicle`, { body: vehicle, keepalive: leaving });
+export const changeSetup = (changes, leaving = false) =>
+  json("PATCH", `${base}/setup`, { body: changes, keepalive: leaving });
 export const saveBaseline = (vehicle) => json("PUT", `${base}/baseline`, { body: vehicle });
 export const simulate = (body) =>
   frames("POST", `${base}/simulations`, { body, accept: FRAMES });

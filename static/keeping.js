@@ -1,19 +1,30 @@
 // What the engineer has set, kept by the service: soon after each change, and when the page goes.
+//
+// The set-up is kept in parts, each by itself: only those that changed here are sent, so that another
+// page of the session keeps its own, and one that is refused holds no other back.
 
 import * as api from "./api.js";
 import { withValues } from "./controls.js";
 import { debounced } from "./dom.js";
 import { damperNames } from "./free.js";
+import { nameOf } from "./names.js";
+import { notice } from "./notices.js";
 import * as priors from "./priors.js";
 import { USUAL } from "./search_form.js";
 import { get, on, set } from "./store.js";
+import * as units from "./units.js";
 
 const SAVE_AFTER = 400;
+/** What the service has of a part that is on its way, or was when the connection went. */
+const UNKNOWN = "";
 
 const ofSession = [
-  keeper("values", () => api.saveVehicle(withValues(get("vehicle"), get("values")))),
+  // A car that is refused is told on its ride.
+  keeper("values", () => new Map([["", withValues(get("vehicle"), get("values"))]]),
+    (_, vehicle, leaving) => api.saveVehicle(vehicle, leaving), () => () => {}),
   keeper("ride use fixed bounds noise priors search sensors fitNoise traction rimsSettings braking",
-    () => api.saveSetup(setup())),
+    parts, (key, value, leaving) => api.changeSetup(change(key, value), leaving),
+    (key, error) => notice("error", `${told(key)} is not kept`, error.message)),
 ];
 
 /** Something that was set may not have reached the service yet. */
@@ -23,40 +34,113 @@ export const save = () => Promise.all(ofSession.map((one) => one.save()));
 /** Keep what changes from now on. */
 export const follow = () => ofSession.forEach((one) => one.follow());
 
-function keeper(keys, send) {
-  let changed = false;
-  let saving = false;
-  async function keep() {
-    if (!changed) return;
-    changed = false;
-    saving = true;
-    try {
-      await send();
-    } catch (error) {
-      // What is refused is told where it acts, on the ride or on the fit, and sent again once mended.
-      changed = true;
-      if (error.lost) set({ online: false });
-    }
-    saving = false;
+/**
+ * Keeps `parts()`, a value (null for none) by key, one after the other: the newest is sent last.
+ * `refused(key, error)` tells of one that is not kept, and gives what takes that back.
+ */
+function keeper(keys, parts, send, refused) {
+  /** What the service has, as text; nothing is sent before it is known. */
+  let kept = null;
+  const refusals = new Map();
+  let last = Promise.resolve();
+  let saving = 0;
+
+  const texts = () => new Map([...parts()].map(([key, value]) => [key, JSON.stringify(value)]));
+  function changed() {
+    if (!kept) return [];
+    const now = texts();
+    return [...new Set([...kept.keys(), ...now.keys()])]
+      .map((key) => [key, now.get(key) ?? "null"])
+      .filter(([key, text]) => text !== (kept.get(key) ?? "null"));
   }
-  const soon = debounced(keep, SAVE_AFTER);
-  window.addEventListener("pagehide", keep);
+  /** What was refused is sent again once it is mended, or where the service failed. */
+  function sendable() {
+    const all = changed();
+    const now = new Map(all);
+    for (const [key, { text, status, takeBack }] of refusals) {
+      if (now.get(key) === text && status < 500) continue;
+      takeBack();
+      refusals.delete(key);
+    }
+    return all.filter(([key]) => !refusals.has(key));
+  }
+
+  async function keep([key, text], leaving) {
+    const before = kept.get(key);
+    kept.set(key, UNKNOWN);
+    try {
+      await send(key, JSON.parse(text), leaving);
+      kept.set(key, text);
+    } catch (error) {
+      if (error.lost) {
+        set({ online: false });
+        return;
+      }
+      if (error.code === undefined) throw error;
+      kept.set(key, before);
+      refusals.set(key, { text, status: error.status, takeBack: refused(key, error) });
+    }
+  }
+  async function keepAll() {
+    saving += 1;
+    try {
+      for (const part of sendable()) await keep(part, false);
+    } finally {
+      saving -= 1;
+    }
+  }
+  const save = () => (last = last.catch(() => {}).then(keepAll));
+  const soon = debounced(save, SAVE_AFTER);
+  window.addEventListener("pagehide", () => sendable().forEach((part) => keep(part, true)));
   return {
-    save: keep, pending: () => changed || saving,
-    follow: () => on(keys, () => { changed = true; soon(); }),
+    save, pending: () => saving > 0 || changed().length > 0,
+    follow: () => { kept = texts(); on(keys, soon); },
   };
 }
 
-/** What the next identification is told, in the words of its request. */
-function setup() {
-  const here = new Set(get("measurements").map(({ id }) => id));
-  const ofRuns = (by) => Object.fromEntries(Object.entries(by).filter(([id]) => here.has(id)));
+
+/** What the next identification is told, in the words of its request: {"part": value, "part entry": value}. */
+function parts() {
   const { kind, id = null, key = null } = get("ride");
-  return {
-    ride: { kind, id, key }, use: ofRuns(get("use")), fixed: get("fixed"), bounds: get("bounds"), noise: get("noise"),
-    priors: priors.whole(), ...get("search"), sensors: get("sensors"), fit_noise: get("fitNoise"),
-    traction: get("traction"), settings: get("rimsSettings"), braking: ofRuns(get("braking")),
+  const whole = {
+    ride: { kind, id, key }, fixed: get("fixed"), ...get("search"), fit_noise: get("fitNoise"), traction: get("traction"),
   };
+  const byEntry = {
+    use: get("use"), bounds: get("bounds"), noise: get("noise"), priors: priors.whole(), sensors: get("sensors"),
+    settings: get("rimsSettings"), braking: get("braking"),
+  };
+  return new Map([...Object.entries(whole), ...Object.entries(byEntry).flatMap(([part, entries]) =>
+    Object.entries(entries).map(([entry, value]) => [`${part} ${entry}`, value]))]);
+}
+
+/** The request that changes one part. */
+function change(key, value) {
+  const [part, entry] = key.split(" ");
+  return entry === undefined ? { [part]: value } : { [part]: { [entry]: value } };
+}
+
+/** What a person calls a part. */
+function told(key) {
+  const [part, entry] = key.split(" ");
+  const parameter = () => units.parameter(entry).label.toLowerCase();
+  const channel = () => units.channel(entry).label.toLowerCase();
+  return {
+    ride: () => "The ride on show",
+    fixed: () => "Which parameters are free",
+    starts: () => "The number of starts",
+    seed: () => "The seed of the starts",
+    loss: () => "How outliers count",
+    loss_scale: () => "From where on outliers count less",
+    fit_noise: () => "Whether noise is found",
+    traction: () => "The traction",
+    settings: () => `How recordings drive the model (${entry})`,
+    use: () => `The use of ${nameOf(entry)}`,
+    braking: () => `When ${nameOf(entry)} brakes`,
+    bounds: () => `The range of ${parameter()}`,
+    noise: () => `The noise of ${channel()}`,
+    priors: () => `What is known before of ${parameter()}`,
+    sensors: () => `The sensor of ${channel()}`,
+  }[part]();
 }
 
 /** The store's part of a session's set-up; of one that has none, what is usual. */

@@ -5,7 +5,7 @@ import * as api from "./api.js";
 import { $, breakable, h, inPlace } from "./dom.js";
 import { RECORDINGS, kindOfJson, requireNotes } from "./file_kinds.js";
 import * as intake from "./intake.js";
-import { lacks, nameOf, original } from "./names.js";
+import { dataOf, lacks, nameOf, original } from "./names.js";
 import { sentence } from "./noise.js";
 import { notice } from "./notices.js";
 import { AXIS, COLOURS, fitWidth } from "./plots.js";
@@ -113,7 +113,7 @@ async function add(files, refusals) {
 
 async function take(file) {
   const row = await api.upload(file);
-  const twin = get("measurements").find(({ sha256 }) => sha256 === row.sha256);
+  const twin = get("measurements").find((one) => one.sha256 === row.sha256 && dataOf(one) === dataOf(row));
   if (twin) {
     await api.deleteMeasurement(row.id);
     selected = twin.id;
@@ -123,22 +123,19 @@ async function take(file) {
   }
   set({ measurements: [...get("measurements"), row] });
   selected = row.id;
+  const stage = nextStage(row);
   const first = original(row);
-  if (first) {
-    notice("warning", `${nameOf(row.id)} holds the same data as ${nameOf(first.id)}`,
-      "It is kept, and left out of fits until its use is chosen; fitted beside the other it would count twice.");
-    return;
-  }
-  const { length } = row.warnings;
-  if (nextStage(row) !== "ready") {
-    const stage = nextStage(row);
-    parts.dismiss = notice("warning", `${nameOf(row.id)} is in`, `${lacks(row)}.`,
+  const copied = first ? [`It holds the same data as ${nameOf(first.id)} and is left out of fits until its use is ` +
+    "chosen; fitted beside the other it would count twice."] : [];
+  if (stage !== "ready") {
+    parts.dismiss = notice("warning", `${nameOf(row.id)} is in`, [`${lacks(row)}.`, ...copied].join(" "),
       { label: TO_DO[stage], run: () => { hooks.open(); show(); intake.open(row.id, stage); } });
     return;
   }
+  const { length } = row.warnings;
   const fit = `${units.number(row.duration, 3)} s, with all that an identification needs`;
-  notice(length ? "warning" : "info", `${nameOf(row.id)} is in`,
-    length ? `${fit}; but what was found in it raises doubts.` : `${fit}.`,
+  const said = length ? `${fit}; but what was found in it raises doubts.` : `${fit}.`;
+  notice(length || first ? "warning" : "info", `${nameOf(row.id)} is in`, [said, ...copied].join(" "),
     length ? { label: `See ${warned(length)}`, run: () => showWarnings(row.id) } : null);
 }
 

@@ -5,13 +5,16 @@ import { nameOf } from "./names.js";
 import { get, set } from "./store.js";
 import * as units from "./units.js";
 
+/** Hz, as the service takes them. */
+const LOW_PASS = { min: "0.5" };
+const HIGH_PASS = { min: "0.02", max: "5" };
 const FILTERS = [
-  ["a_x_cutoff_hz", "aₓ below", "Low-pass of the longitudinal acceleration"],
-  ["rim_cutoff_hz", "wheels below", "Low-pass of the wheel centres"],
+  ["a_x_cutoff_hz", "aₓ below", "Low-pass of the longitudinal acceleration", LOW_PASS],
+  ["rim_cutoff_hz", "wheels below", "Low-pass of the wheel centres", LOW_PASS],
   ["output_cutoff_hz", "z, pitch, roll below",
-    "Low-pass of the compared channels, recorded and simulated alike"],
+    "Low-pass of the compared channels, recorded and simulated alike", LOW_PASS],
   ["output_highpass_hz", "z, pitch, roll above",
-    "High-pass of the compared channels, recorded and simulated alike"],
+    "High-pass of the compared channels, recorded and simulated alike", HIGH_PASS],
 ];
 const TRACTIONS = { exact: "exact", paper: "paper (biased)" };
 const memory = { open: false };
@@ -61,14 +64,12 @@ export function view() {
     h("table", { className: "filters" },
       h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "What counts"),
         h("th", { scope: "col" }, "Hz; empty: none"))),
-      h("tbody", {}, FILTERS.map(([key, name, what]) => {
+      h("tbody", {}, FILTERS.map(([key, name, what, limits]) => {
         const field = h("input", {
-          type: "number", min: "0", step: "any", value: settings[key] ?? "",
+          type: "number", className: "frequency", ...limits, step: "any", value: settings[key] ?? "",
           "aria-label": `${what}, Hz; empty for none`,
           on: { change: () => {
-            const hertz = field.value === "" ? null : Number(field.value);
-            if (hertz === null || Number.isFinite(hertz)) change({ [key]: hertz });
-            else field.value = get("rimsSettings")[key] ?? "";
+            if (field.reportValidity()) change({ [key]: field.value === "" ? null : Number(field.value) });
           } },
         });
         return h("tr", {}, h("th", { scope: "row", title: what }, name), h("td", {}, field));
@@ -102,9 +103,11 @@ export function brakingField(run) {
   return field;
 }
 
-/** Whether every mark can be read; the first that cannot says so. */
+/** Whether every field can be read; the first that cannot says so. */
 export function ready() {
-  const wrong = document.querySelector("input.braking:invalid");
+  const wrong = document.querySelector("input.braking:invalid, input.frequency:invalid");
+  const folded = wrong?.closest("details");
+  if (folded) folded.open = true;
   wrong?.reportValidity();
   return !wrong;
 }

@@ -122,7 +122,8 @@ function drawing(result, profile, others) {
     h("p", { className: "outcome profile-said" }, symbolOf(profile.name), " 95 %: ",
       h("strong", {}, units.withUnit(span(profile.confidence_interval, factor), unit)),
       h("span", { className: "soft" }, ` by the profile; ${span(estimate.confidence_interval, factor)} by the fit's errors.`)),
-    profile.sentences.map((text) => h("p", { className: "hint" }, worded(text))),
+    // Profiles of an earlier service have none.
+    (profile.sentences ?? []).map((text) => h("p", { className: "hint" }, worded(text))),
     box, steps,
     h("p", { className: "legend-line profile-legend" }, h("span", { className: "key now" }, "profile"),
       h("span", { className: "key reference" }, "if the errors were exactly Gaussian"),

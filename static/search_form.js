@@ -8,14 +8,15 @@ const LOSSES = {
   linear: "least squares", soft_l1: "soft L1", huber: "Huber", cauchy: "Cauchy", arctan: "arctan",
 };
 export const USUAL = { starts: 1, seed: 0, loss: "linear", loss_scale: 3 };
-const MOST_STARTS = 1024;
+/** What the service takes. */
+const LIMITS = { starts: { min: "1", max: "1024" }, seed: { min: "0", max: String(2 ** 53) }, loss_scale: { min: "0.01", max: "1e6" } };
 const memory = { open: false };
 
 const ask = (change) => set({ search: { ...get("search"), ...change } });
 
 export function view() {
   const summary = h("summary");
-  const scale = number("loss_scale", "From so many noises on", { min: "0.01", step: "any" },
+  const scale = number("loss_scale", "From so many noises on", { step: "any" },
     "Residuals beyond this many noises count as outliers");
   const follow = () => {
     scale.field.disabled = get("search").loss === "linear";
@@ -25,7 +26,7 @@ export function view() {
     on: { change: () => { ask({ loss: loss.value }); follow(); } } },
   Object.entries(LOSSES).map(([key, text]) => h("option", { value: key, selected: key === get("search").loss }, text)));
   function number(key, label, properties, title) {
-    const field = h("input", { type: "number", id: `search-${key}`, title, value: get("search")[key], ...properties,
+    const field = h("input", { type: "number", id: `search-${key}`, title, ...LIMITS[key], ...properties, value: get("search")[key],
       on: { change: () => {
         if (field.value === "") field.value = USUAL[key];
         if (field.reportValidity()) ask({ [key]: Number(field.value) });
@@ -34,10 +35,10 @@ export function view() {
     return { field, label: h("label", { className: "block" }, label, field) };
   }
   const part = fold(memory, summary, h("div", { className: "search-fields" },
-    number("starts", "Starts", { min: "1", max: String(MOST_STARTS), step: "1" },
+    number("starts", "Starts", { step: "1" },
       "1: the sliders' values alone. 64: further points between the bounds, the best of which are searched from, " +
       "to find other minima").label,
-    number("seed", "Seed of the starts", { min: "0", step: "1" }, "Another whole number draws other starts").label,
+    number("seed", "Seed of the starts", { step: "1" }, "Another whole number draws other starts").label,
     h("label", { className: "block" }, "Outliers count by", loss), scale.label));
   follow();
   return part;

@@ -181,10 +181,10 @@ def mappings(given: Iterable[str], paths: Sequence[str]) -> list[str | None]:
     others: str | None = None
     for text in given:
         argument = f"--mapping {text}"
-        name, equals, file = text.rpartition("=")
-        if equals and not (name and file):
+        name, file = run_and_file(text)
+        if name == "" or not file:
             raise ArgumentError(f"{argument} names no run or no file; write FILE or RUN=FILE.")
-        place = place_of(name, paths, argument) if equals else None
+        place = None if name is None else place_of(name, paths, argument)
         if others is not None if place is None else place in of_run:
             raise ArgumentError(
                 f"{argument} is a second mapping of {name or 'the same runs'}; give one, as FILE "
@@ -195,6 +195,17 @@ def mappings(given: Iterable[str], paths: Sequence[str]) -> list[str | None]:
         else:
             of_run[place] = file
     return [of_run.get(place, others) for place in range(len(paths))]
+
+
+def run_and_file(text: str) -> tuple[str | None, str]:
+    """The run (None untold) and the file of [RUN=]FILE: of a file that is there the whole name
+    counts, whatever = is in it.
+    """
+    if "=" not in text or Path(text).is_file():
+        return None, text
+    parts = text.split("=")
+    ways = [("=".join(parts[:k]), "=".join(parts[k:])) for k in range(1, len(parts))]
+    return next((way for way in ways if Path(way[1]).is_file()), ways[-1])
 
 
 def place_of(name: str, paths: Sequence[str], argument: str) -> int:

@@ -20,7 +20,7 @@ from ...engine.run import Run
 from ...engine.run_notes import notes_beside, read_notes
 from ...engine.vehicle import Vehicle
 from ...engine.vehicle_file import read_vehicle, reference_vehicles
-from .arguments import braking, mappings
+from .arguments import braking, mappings, run_and_file
 
 Known = TypeVar("Known")
 
@@ -80,7 +80,7 @@ def find_mappings(given: Iterable[str], paths: Sequence[str]) -> list[ChannelMap
 
 def mapping_files(given: Iterable[str]) -> list[str]:
     """All that `find_mappings` reads."""
-    return [text.rpartition("=")[2] for text in given]
+    return [run_and_file(text)[1] for text in given]
 
 
 def read_one(

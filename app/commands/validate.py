@@ -22,7 +22,7 @@ from ...engine.validation.validate import ValidatedRun, Validation
 from ...engine.validation.validate import validate as predict
 from ...engine.validation.validation_file import validation_to_json
 from ..report import made, report
-from .arguments import ArgumentError, place_of, rims_settings
+from .arguments import ArgumentError, place_of, rims_settings, run_and_file
 from .identify import asked, fitted, print_fit
 from .inputs import (
     find_manoeuvre,
@@ -84,7 +84,7 @@ def _require_places(options: Namespace, paths: Sequence[str]) -> None:
         *mapping_files(options.mapping),
         *recording_files(paths),
         *beside,
-        *(text.partition("=")[2] for text in options.manoeuvre),
+        *(run_and_file(text)[1] for text in options.manoeuvre),
     )
     require_place(options.output, inputs)
     require_place(options.json, inputs)
@@ -103,8 +103,8 @@ def _manoeuvres(given: Sequence[str], paths: Sequence[str]) -> dict[int, Manoeuv
     found: dict[int, Manoeuvre] = {}
     for text in given:
         argument = f"--manoeuvre {text}"
-        name, equals, manoeuvre = text.rpartition("=")
-        if not (equals and manoeuvre):
+        name, manoeuvre = run_and_file(text)
+        if not (name and manoeuvre):
             raise ArgumentError(f"{argument} names no run or no manoeuvre; write RUN=NAME.")
         place = place_of(name, paths, argument)
         if place in found:

@@ -57,6 +57,9 @@ class Visitor:
     def put(self, path: str, **options):
         return self.request("PUT", path, **options)
 
+    def patch(self, path: str, **options):
+        return self.request("PATCH", path, **options)
+
     def delete(self, path: str = "", **options):
         return self.request("DELETE", path, **options)
 

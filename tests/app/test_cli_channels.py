@@ -6,6 +6,8 @@ import re
 import numpy as np
 import pytest
 from ridetune.app.cli import main
+from ridetune.app.commands.arguments import mappings
+from ridetune.app.commands.inputs import mapping_files
 from ridetune.engine.mapping.mapping import read_mapping
 from ridetune.engine.mapping.reading import read_recording
 from ridetune.engine.measurement import read_run, write_run
@@ -187,6 +189,16 @@ def test_a_mapping_that_is_no_run_s_is_refused(foreign, capsys, command, told, s
     name, *more = command
     asked = [name, "foreign.csv", *more, "--vehicle", "paper", "--mapping", *told]
     assert sentence in refused(capsys, *asked)
+
+
+def test_a_file_that_is_there_is_meant_by_its_whole_name(folder):
+    """Whatever = is in it, alone and after a run; of one that is not there the last one parts."""
+    (folder / "car=7.json").touch()
+    paths = ["lap=1.csv", "lap.csv"]
+    assert mappings(["car=7.json"], paths) == ["car=7.json"] * 2
+    assert mappings(["lap=1.csv=car=7.json"], paths) == ["car=7.json", None]
+    assert mappings(["lap=1.csv=nowhere.json"], paths) == ["nowhere.json", None]
+    assert mapping_files(["lap.csv=car=7.json"]) == ["car=7.json"]
 
 
 def test_what_makes_no_sense_with_a_mapping_is_refused(foreign, capsys):

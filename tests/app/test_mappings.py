@@ -249,6 +249,24 @@ def test_our_own_names_can_be_mapped_otherwise(visitor):
     assert visitor.delete(f"{path}/mapping").json() == sent
 
 
+def test_a_copy_without_a_mapping_does_not_join_two_that_are_mapped_apart(visitor, kept):
+    """It is the same as the first of its bytes alone, until it is mapped, too."""
+    data = foreign(turned=("chassis.pitch",))
+    turned, bare = (visitor.upload(data, name).json() for name in ("turned.csv", "bare.csv"))
+    assert bare["same_data_as"] == kept["id"]
+    path = f"/measurements/{kept['id']}"
+    mapping = visitor.get(f"{path}/columns").json()["proposed"]
+    visitor.put(f"{path}/mapping", json=mapping)
+    [pitch] = [one for one in mapping["columns"] if one["channel"] == "chassis.pitch"]
+    pitch["sign"] = -pitch["sign"]
+    visitor.put(f"/measurements/{turned['id']}/mapping", json=mapping)
+    same = {one["name"]: one["same_data_as"] for one in visitor.get("/measurements").json()}
+    assert (same["turned.csv"], same["bare.csv"]) == (None, kept["id"])
+    visitor.put(f"/measurements/{bare['id']}/mapping", json=mapping)
+    same = {one["name"]: one["same_data_as"] for one in visitor.get("/measurements").json()}
+    assert (same["turned.csv"], same["bare.csv"]) == (None, turned["id"])
+
+
 def test_a_preview_shows_the_file_s_numbers_over_time_in_s(visitor, kept):
     path = f"/measurements/{kept['id']}/columns/preview?index=2&index=3&points=40"
     pitch, a_x = visitor.get(path).json()

@@ -71,6 +71,23 @@ def test_the_same_drive_under_another_name_is_remarked(visitor):
     assert other["same_data_as"] is None
 
 
+def test_the_same_bytes_under_another_mapping_are_other_data(visitor):
+    """A body that goes down is another than one that goes up; turned back, they are the same."""
+    data = short_recording()
+    first, second, third = (visitor.upload(data, f"{name}.csv").json() for name in "abc")
+    path = f"/measurements/{second['id']}"
+    mapping = visitor.get(f"{path}/columns").json()["proposed"]
+    for one in mapping["columns"]:
+        one["unit"] = {"time": "s", "chassis.a_x": "m/s^2"}.get(one["column"], "mm")
+    [height] = [one for one in mapping["columns"] if one["channel"] == "chassis.z"]
+    height["sign"] = -1
+    turned = visitor.put(f"{path}/mapping", json=mapping).json()
+    assert (turned["same_data_as"], turned["remarks"]) == (None, [])
+    assert visitor.get(f"/measurements/{third['id']}").json()["same_data_as"] == first["id"]
+    height["sign"] = 1
+    assert visitor.put(f"{path}/mapping", json=mapping).json()["same_data_as"] == first["id"]
+
+
 def test_a_bare_body_is_an_upload_too(visitor):
     data = short_recording()
     reply = visitor.post("/measurements?name=bare.csv", content=data)
@@ -95,7 +112,7 @@ def test_what_an_identification_lacks_is_listed(visitor):
     assert found["missing"] == ["chassis.a_x"]
 
 
-def test_the_histories_come_as_binary_json_and_csv(visitor):
+def test_the_histories_come_as_binary_and_json_and_whole_as_csv(visitor):
     sample = visitor.get("/measurements").json()[0]
     path = f"/measurements/{sample['id']}/frames?channels=chassis.z,wheel.fl.z&max_samples=500"
     binary = visitor.get(path, headers={"Accept": "application/vnd.ridetune.frames"})
@@ -105,7 +122,9 @@ def test_the_histories_come_as_binary_json_and_csv(visitor):
     assert head["samples"] <= 500
     shown = visitor.get(path).json()
     assert shown["values"]["chassis.z"] == pytest.approx(values["chassis.z"].tolist(), abs=1e-6)
-    csv = visitor.get(path, headers={"Accept": "text/csv"})
+    assert visitor.get(path, headers={"Accept": "text/csv"}).status_code == 406
+    csv = visitor.get(f"/measurements/{sample['id']}/run.csv")
+    assert csv.headers["content-type"] == "text/csv; charset=utf-8"
     assert csv.text.startswith("time [s],")
     assert len(csv.text.splitlines()) == sample["samples"] + 1
 
@@ -143,6 +162,7 @@ def test_notes_state_the_noise_of_a_recording(visitor):
     [
         (b"[noise]\n", "lap.toml states no noise of chassis.z, chassis.pitch, chassis.roll"),
         (b'[noise]\n"wheel.fl.z" = 1e-3\n', "lap.toml states no noise of chassis.z"),
+        (b'description = "wet"\n', "or vehicle = and the name of the car"),
         (b'[noise]\n"chassis.z" = -1\n', "give a positive number in m"),
         (b"time [s],chassis.z [mm]\n0,1\n", "lap.toml: not valid TOML"),
     ],

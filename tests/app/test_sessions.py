@@ -58,7 +58,7 @@ def test_the_set_up_of_the_next_fit_is_kept_with_the_session(visitor):
         "sensors": {"chassis.z": {"delay": "fit"}},
         "loss": "huber",
     }
-    kept = visitor.put("/setup", json=told).json()
+    kept = visitor.patch("/setup", json=told).json()
     assert visitor.get("/setup").json() == visitor.get().json()["setup"] == kept
     settings = visitor.client.get("/api/rims-settings").json()
     assert kept["settings"] == settings | {"output_highpass_hz": 0.3}
@@ -70,14 +70,81 @@ def test_the_set_up_of_the_next_fit_is_kept_with_the_session(visitor):
         assert kept[name] == fit[name]
 
 
+def test_a_set_up_is_changed_part_by_part(visitor):
+    """What is not told stays, entry by entry; null takes an entry away."""
+    one, other = (kept["id"] for kept in visitor.get("/measurements").json())
+    first = {
+        "use": {one: "fit"},
+        "braking": {one: [[1.0, 2.0]]},
+        "bounds": {"K_F": [12e3, None], "K_R": [None, 40e3]},
+        "settings": {"a_x_cutoff_hz": None},
+        "starts": 4,
+    }
+    visitor.patch("/setup", json=first)
+    visitor.patch("/setup", json={"ride": {"kind": "manoeuvre", "key": "2"}})
+    changes = {
+        "use": {other: "hold_out"},
+        "braking": {one: None},
+        "bounds": {"front.suspension.stiffness": None},
+        "settings": {"rim_cutoff_hz": 30.0},
+    }
+    kept = visitor.patch("/setup", json=changes).json()
+    assert kept["ride"] == {"kind": "manoeuvre", "id": None, "key": "2"}
+    assert kept["use"] == {one: "fit", other: "hold_out"}
+    assert kept["braking"] == {}
+    assert kept["bounds"] == {"rear.suspension.stiffness": [None, 40e3]}
+    assert kept["settings"]["a_x_cutoff_hz"] is None
+    assert kept["settings"]["rim_cutoff_hz"] == 30.0
+    assert kept["starts"] == 4
+
+
+def test_what_a_set_up_tells_of_a_measurement_goes_with_it(visitor):
+    one, other = (kept["id"] for kept in visitor.get("/measurements").json())
+    visitor.patch("/setup", json={"use": {one: "fit", other: "fit"}, "braking": {one: []}})
+    visitor.delete(f"/measurements/{one}")
+    kept = visitor.patch("/setup", json={"use": {"of another session": "fit"}}).json()
+    assert kept["use"] == {other: "fit"}
+    assert kept["braking"] == {}
+
+
 @pytest.mark.parametrize(
     ("wrong", "field"),
-    [({"use": {"x": "holdout"}}, "use"), ({"starts": 0}, "starts"), ({"starst": 2}, "starst")],
+    [
+        ({"use": {"x": "holdout"}}, "use.x"),
+        ({"starts": 0}, "starts"),
+        ({"starst": 2}, "starst"),
+        ({"seed": 2**53 + 1}, "seed"),
+        ({"settings": {"rim_cutoff_hz": 0.2}}, "settings.rim_cutoff_hz"),
+        ({"fixed": ["front.pivot.angel"]}, "fixed.0"),
+        ({"bounds": {"K_X": [1.0, 2.0]}}, "bounds.K_X"),
+        ({"bounds": {"K_F": [2e4, 1e4]}}, "bounds.K_F"),
+        ({"priors": {"front.suspension.stifness": [1.0, 1.0]}}, "priors"),
+        ({"priors": {"K_F": [2e4, 0.0]}}, "priors.K_F.1"),
+        ({"noise": {"chassis.z": -0.1}}, "noise.chassis.z"),
+        ({"noise": {"chassis.zz": 0.1}}, "noise.chassis.zz"),
+        ({"sensors": {"chassis.zz": {"sign": -1}}}, "sensors.chassis.zz"),
+        ({"ride": {"kind": "measurement", "key": "2"}}, "ride"),
+        ({"ride": {"kind": "manoeuvre"}}, "ride"),
+    ],
 )
-def test_a_set_up_that_no_fit_could_have_is_refused(visitor, wrong, field):
-    reply = visitor.put("/setup", json=wrong)
+def test_a_part_of_a_set_up_that_says_nothing_to_a_fit_is_refused(visitor, wrong, field):
+    """Unknown names and numbers out of every range; whether a fit can be made is for the fit."""
+    reply = visitor.patch("/setup", json=wrong)
     assert reply.status_code == 422
     assert reply.json()["field"].startswith(field)
+    assert reply.json()["detail"].endswith(".")
+    assert visitor.get("/setup").json() is None
+
+
+def test_a_set_up_is_no_place_for_much(visitor):
+    """A session keeps at most 50 measurements, and a change of its set-up has 64 kB."""
+    use = {f"{number:016x}": "fit" for number in range(51)}
+    reply = visitor.patch("/setup", json={"use": use})
+    assert reply.status_code == 422
+    assert "more than the 50 measurements" in reply.json()["detail"]
+    reply = visitor.patch("/setup", json={"use": {"x" * 64_000: "fit"}})
+    assert reply.status_code == 413
+    assert "0.064 MB" in reply.json()["detail"]
     assert visitor.get("/setup").json() is None
 
 

@@ -229,17 +229,20 @@ def service(tmp_path_factory) -> Iterator[Service]:
 
 @pytest.fixture
 def visit(browser) -> Iterator[Callable[[], Visitor]]:
-    """Makes visitors; each has cookies, and so a session, of its own.
+    """Makes visitors; each has cookies, and so a session, of its own, or sits `beside` another.
 
     Drawing in software is slow: the 3D view is small, and empty in stories that are not about it.
     """
     contexts: list[BrowserContext] = []
     visitors: list[Visitor] = []
 
-    def arrive(in_3d: bool = False) -> Visitor:
+    def arrive(in_3d: bool = False, beside: Visitor | None = None) -> Visitor:
         size = (1120, 640) if in_3d else (1366, 768)
-        context = browser.new_context(viewport={"width": size[0], "height": size[1]})
-        contexts.append(context)
+        if beside is None:
+            context = browser.new_context(viewport={"width": size[0], "height": size[1]})
+            contexts.append(context)
+        else:
+            context = beside.page.context
         visitor = Visitor(context.new_page(), in_3d)
         if not in_3d:
             visitor.page.route("**/viewer/*", lambda route: route.fulfill(body="<!doctype html>"))

@@ -272,8 +272,8 @@ def test_the_same_drive_written_otherwise_is_told_and_left_out(visitor):
     add_file(visitor, "windows.csv", data.replace(b"\n", b"\r\n"))
     notice = visitor.element(".notice")
     visitor.wait(notice.is_visible, "it is told")
-    told = "windows.csv holds the same data as detailed_manoeuvre_1.csv"
-    assert told in notice.inner_text()
+    assert "windows.csv is in" in notice.inner_text()
+    assert "the same data as detailed_manoeuvre_1.csv" in notice.inner_text()
     assert visitor.look("ridetune.state('measurements').length") == 3
     visitor.click("#tab-identification")
     use = visitor.page.get_by_label("Use of windows.csv")
@@ -284,6 +284,48 @@ def test_the_same_drive_written_otherwise_is_told_and_left_out(visitor):
     use.select_option("fit")
     assert "which so counts twice" in runs.inner_text()
     assert use.evaluate("(field) => field === document.activeElement")
+
+
+def test_a_copy_that_lacks_a_channel_leads_to_its_next_stage(visitor):
+    """Twice the same drive without its wheels, written otherwise."""
+    visitor.click("#tab-measurements")
+    lines = short_run().split(b"\n")
+    lacking = b"\n".join(b",".join(line.split(b",")[:3]) for line in lines if line) + b"\n"
+    add_file(visitor, "lacking.csv", lacking)
+    visitor.until("ridetune.state('measurements').length === 3")
+    add_file(visitor, "again.csv", lacking.replace(b"\n", b"\r\n"))
+    notice = visitor.page.locator(".notice", has_text="again.csv is in")
+    visitor.wait(notice.is_visible, "it is told")
+    assert "the same data as lacking.csv" in notice.inner_text()
+    assert "It lacks" in notice.inner_text()
+    notice.get_by_role("button", name="Condition").click()
+    visitor.wait(visitor.element("#intake").is_visible, "the next stage is open")
+    assert "again.csv" in visitor.element("#intake-title").inner_text()
+
+
+def test_the_same_file_under_another_mapping_is_other_data(visitor):
+    """The copy keeps the bytes, and the mapping of the first is turned over before it comes."""
+    session = visitor.look("ridetune.state('session')")
+    first = visitor.look("ridetune.state('measurements')[0].id")
+    path = f"/api/sessions/{session}/measurements/{first}"
+    visitor.page.evaluate(
+        """async (path) => {
+            const { proposed } = await (await fetch(`${path}/columns`)).json();
+            const turned = proposed.columns.find(({ channel }) => channel === "chassis.pitch");
+            turned.sign = -1;
+            await fetch(`${path}/mapping`, { method: "PUT", body: JSON.stringify(proposed),
+                headers: { "Content-Type": "application/json" } });
+        }""",
+        path,
+    )
+    visitor.page.reload()
+    visitor.wait_until_drawn()
+    visitor.click("#tab-measurements")
+    add_file(visitor, "upright.csv", (SAMPLES / "detailed/manoeuvre_1.csv").read_bytes())
+    visitor.until("ridetune.state('measurements').length === 3")
+    visitor.click("#tab-identification")
+    assert "the same data" not in visitor.element(".runs").inner_text()
+    assert visitor.page.get_by_label("Use of upright.csv").input_value() == "hold_out"
 
 
 def test_an_upload_with_warnings_leads_to_them(visitor):

@@ -33,6 +33,16 @@ def fitted(visitor):
     return visitor.look("ridetune.state('fit')")
 
 
+def as_kept_earlier(route):
+    """A profile without sentences, which tells that a side is at a bound, but not of what."""
+    job = route.fetch().json()
+    profile = job["result"]
+    del profile["sentences"]
+    for side in ("lower_at_bound", "upper_at_bound"):
+        profile[side] = bool(profile[side])
+    route.fulfill(json=job)
+
+
 def test_a_fit_tells_what_its_run_determines_and_what_to_drive_next(analyst):
     """Truth: a bar acts on the wheels as K_tor/d^2, so that the run holds that and not the two."""
     visitor, page = analyst, analyst.page
@@ -79,6 +89,15 @@ def test_a_fit_tells_what_its_run_determines_and_what_to_drive_next(analyst):
     page.keyboard.press("End")
     last = profile["points"][-1]["value"] / 1000
     assert f"held at {last:.2f} N/mm" in visitor.element(".profile-others").inner_text()
+
+    # One that an earlier service kept is drawn, too.
+    page.route(f"**/profiles/{visitor.look('ridetune.profile().id')}", as_kept_earlier)
+    page.reload()
+    visitor.wait_until_drawn()
+    page.locator("#tab-identification").click()
+    page.locator("#fit-profile").click()
+    page.locator(".profile-plot canvas").wait_for()
+    page.locator("#fit-parameters").click()
 
     # Braking comes first, is seen as a ride, and is chosen in the campaign form.
     page.locator("#fit-advice").click()

@@ -1,4 +1,5 @@
 import math
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from ridetune.engine.formats.opening import opened_bytes
 from ridetune.engine.mapping.apply import apply
 from ridetune.engine.mapping.mapping import ChannelMapping, MappedColumn
 from ridetune.engine.measurement import (
+    BLOCK,
     missing_for_identification,
     parse_run,
     read_run,
@@ -116,6 +118,20 @@ def test_a_written_run_names_si_units_in_the_table_s_order():
     head, *rows = run_to_csv(run).splitlines()
     assert head == "time [s],chassis.v_x [m/s],wheel.fl.z [m]"
     assert len(rows) == SAMPLES
+
+
+def test_a_long_run_is_written_in_little_memory(tmp_path):
+    """Oracle: the text is 12 bytes and more a number, of which a small part is held at a time."""
+    count = 20 * BLOCK + 1
+    time = 0.001 * np.arange(count)
+    run = Run("r.csv", time, {"chassis.z": np.sin(time), "chassis.a_x": np.cos(time)})
+    tracemalloc.start()
+    write_run(run, tmp_path / "r.csv")
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 0.5 * (tmp_path / "r.csv").stat().st_size
+    found = read_run(tmp_path / "r.csv")
+    np.testing.assert_allclose(found["chassis.a_x"], run["chassis.a_x"], rtol=1e-11)
 
 
 def test_notes_beside_the_file_state_noise_and_description(tmp_path):
