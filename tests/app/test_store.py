@@ -13,6 +13,7 @@ import pytest
 from ridetune.app.data_directory import DataDirectory
 from ridetune.app.errors import Busy, Conflict, NotFound, StartError
 from ridetune.app.settings import Limits
+from ridetune.app.setup_form import SetupForm
 from ridetune.app.store import NewMeasurement, Store
 
 CAR = {"name": "a car"}
@@ -130,8 +131,8 @@ def test_a_database_of_an_earlier_version_is_taken_over(tmp_path, version):
     noted = store.set_notes(session, kept.id, {}, [{"step": {"kind": "rest"}}], kept.summary)
     assert noted.conditioned == [{"step": {"kind": "rest"}}]
     assert store.session(session).setup is None
-    store.set_setup(session, {"starts": 16})
-    assert store.session(session).setup == {"starts": 16}
+    store.setups.change(session, SetupForm(starts=16))
+    assert (store.session(session).setup or {})["starts"] == 16
     assert store.set_manoeuvre(session, kept.id, {"name": "lap"}).manoeuvre == {"name": "lap"}
     assert store.finish_job(job, "done", result={}, file=b"rows")
     store.close()
