@@ -3,7 +3,7 @@
 // The truth is `values` of the store (SI); a slider shows it, clamped to its range. On each track
 // lie the baseline (a tick) and, after a fit, the 95 % interval of the identified value (a band).
 
-import { condition, DETERMINED, isConditional } from "./determined.js";
+import { condition, DETERMINED } from "./determined.js";
 import { $, capital, h, symbol } from "./dom.js";
 import { isKnown, span } from "./intervals.js";
 import { notice } from "./notices.js";
@@ -332,7 +332,7 @@ function band(parts, estimate, factor, at, shown) {
   interval.style.left = at(low);
   interval.style.right = `calc(100% - ${at(high).slice(4)}`;
   interval.className = `interval ${estimate.determined}`;
-  const held = isConditional(estimate.determined, get("fit"));
+  const held = condition(estimate.name, get("fit"));
   interval.classList.toggle("open-below", open[0]);
   interval.classList.toggle("open-above", open[1]);
   const half = (high - low) / 2;
@@ -344,5 +344,5 @@ function band(parts, estimate, factor, at, shown) {
   spread.className = `spread ${estimate.determined}${held ? " conditional" : ""}`;
   spread.title =
     `Identified ${units.withUnit(units.number(value), parameter.display_unit)}, 95 % interval ` +
-    `${span(said, factor)}; ${DETERMINED[estimate.determined]}${held ? `, ${condition(get("fit"))}` : ""}`;
+    `${span(said, factor)}; ${DETERMINED[estimate.determined]}${held ? `, ${held}` : ""}`;
 }

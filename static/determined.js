@@ -10,21 +10,22 @@ export const DETERMINED = {
   no: "not determined",
 };
 
-/** "if KtorR is where its bound puts it" of a fit, or nothing; fits of earlier versions have no conditions. */
-export function condition(result) {
-  const held = (result.verdict.conditions ?? []).map((name) => units.parameter(name)?.label.toLowerCase() ?? name);
+/**
+ * "if rear bar stiffness is where its bound puts it" of a parameter or combination, or nothing; fits of
+ * earlier versions have no conditions.
+ */
+export function condition(of, result) {
+  const held = Object.entries(result.verdict.conditions ?? {}).filter(([, moved]) => moved.includes(of))
+    .map(([name]) => units.parameter(name)?.label.toLowerCase() ?? name);
   if (!held.length) return "";
   return `if ${held.join(" and ")} ${held.length > 1 ? "are where their bounds put them" : "is where its bound puts it"}`;
 }
 
-/** Whether a word of this fit holds on a condition only. */
-export const isConditional = (word, result) => word !== "no" && Boolean(condition(result));
-
-/** The word, marked. */
-export function mark(word, result, title = DETERMINED[word]) {
-  const held = isConditional(word, result);
+/** How well a parameter or combination is determined, marked. */
+export function mark({ name, determined: word }, result) {
+  const held = condition(name, result);
   return h("span", {
     className: `determined ${word}${held ? " conditional" : ""}`,
-    title: held ? `${title}, ${condition(result)}` : title,
+    title: held ? `${DETERMINED[word]}, ${held}` : DETERMINED[word],
   }, held ? `${WORDS[word]}, if …` : WORDS[word]);
 }

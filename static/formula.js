@@ -36,8 +36,8 @@ export const shownIn = (unit) =>
   (unit === "N/m" ? [1e-3, "N/mm"] : [1, unit === "1" ? "" : units.pretty(unit)]);
 
 /** A row of how a combination is determined, for a table. */
-export function combinationRow({ symbol: text, label, unit, value, confidence_interval: interval,
-  determined }, { span, share, mark }) {
+export function combinationRow({ symbol: text, label, unit, value, confidence_interval: interval },
+  { span, share, mark }) {
   const [factor, shown] = shownIn(unit);
   return h("tr", {},
     h("th", { scope: "row", title: label }, h("span", { className: "formula" }, formula(text)), " ",
@@ -46,5 +46,5 @@ export function combinationRow({ symbol: text, label, unit, value, confidence_in
     h("td", {}, share(value, interval)),
     h("td", { className: "unit" }, shown),
     h("td", { className: "soft span" }, span(interval, factor)),
-    h("td", {}, mark(determined)));
+    h("td", {}, mark));
 }

@@ -164,7 +164,7 @@ function estimateRow(estimate, result, profile) {
     h("td", { className: "span" }, span(interval, row.display_factor)),
     h("td", { className: "soft long" }, shown(estimate.start)),
     h("td", { className: "soft span bounds" }, bounds),
-    h("td", {}, estimate.at_bound ? atBound(estimate, upper, searched) : mark(estimate.determined, result)),
+    h("td", {}, estimate.at_bound ? atBound(estimate, upper, searched) : mark(estimate, result)),
     h("td", { className: "action" }, h("button", { type: "button", className: "profile-of",
       "aria-label": `Profile of ${row.label}`, title: "Profile: how the fit gets worse when this one is held elsewhere",
       on: { click: () => profile(estimate.name) } })));

@@ -1,6 +1,6 @@
 // What the runs of a fit determine: in sentences, as combinations, and along which directions not.
 
-import { isConditional, mark, WORDS } from "./determined.js";
+import { condition, mark, WORDS } from "./determined.js";
 import { h } from "./dom.js";
 import { combinationRow, formula, symbolOf } from "./formula.js";
 import { share, span } from "./intervals.js";
@@ -18,12 +18,15 @@ const APART = 3;
 
 /** How many parameters are well, weakly and not determined; `open()` shows the verdict. */
 export function summary(result, open) {
-  const { verdict } = result;
+  const counts = Object.entries(WORDS).flatMap(([word, text]) => {
+    const names = result.verdict.parameters[word];
+    const held = names.filter((name) => condition(name, result)).length;
+    return [[names.length - held, word, text], [held, `${word} conditional`, `${text}, if …`]];
+  });
   return h("button", { type: "button", className: "link verdict-counts", title: "What these runs determine",
     on: { click: open } },
-  Object.keys(WORDS).filter((word) => verdict.parameters[word].length).map((word) =>
-    h("span", { className: `determined ${word}${isConditional(word, result) ? " conditional" : ""}` },
-      `${verdict.parameters[word].length} ${WORDS[word]}${isConditional(word, result) ? ", if …" : ""}`)));
+  counts.filter(([count]) => count).map(([count, marks, text]) =>
+    h("span", { className: `determined ${marks}` }, `${count} ${text}`)));
 }
 
 /** The combinations that are better known than what they are made of, as a table; or nothing. */
@@ -34,7 +37,7 @@ export function combinations(result) {
     h("caption", {}, "Determined together, where the parameters are not known apart"),
     h("thead", {}, h("tr", {}, ["Combination", "Value", "95 %", "Unit", "95 % interval", "Determined"].map((text) =>
       h("th", { scope: "col", className: text === "Unit" ? "unit" : "" }, text)))),
-    h("tbody", {}, verdict.combinations.map((one) => combinationRow(one, { span, share, mark: (word) => mark(word, result) }))));
+    h("tbody", {}, verdict.combinations.map((one) => combinationRow(one, { span, share, mark: mark(one, result) }))));
 }
 
 /** The whole verdict. */
@@ -45,15 +48,13 @@ export function view(result) {
     h("div", { className: "fit-side scrolls" }, directions(result)));
 }
 
-function said(result) {
-  const { verdict, outcome } = result;
+function said({ verdict, outcome }) {
   if (!verdict.sentences.length) {
     return h("p", { className: "verdict-said" }, outcome, " So nothing is said of its parameters.");
   }
   const classes = Object.keys(WORDS).filter((word) => verdict.parameters[word].length);
   return h("ul", { className: "verdict-said" }, verdict.sentences.map((text, i) =>
-    h("li", { className: i < classes.length
-      ? `determined ${classes[i]}${isConditional(classes[i], result) ? " conditional" : ""}` : "" },
+    h("li", { className: i < classes.length ? `determined ${classes[i]}` : "" },
       h("span", {}, formula(text)))));
 }
 

@@ -181,15 +181,15 @@ class Verdict:
     parameters : by "yes", "weakly" and "no", their names
     combinations : that the runs determine better than their parameters
     directions : axes of the covariance, the least determined first
-    conditions : what is at a bound without which parameters or combinations that are determined
-        would be elsewhere
+    conditions : by what is at a bound, the parameters and combinations that are determined and
+        would be elsewhere without it
     sentences : the same for a person
     """
 
     parameters: Mapping[str, tuple[str, ...]]
     combinations: tuple[CombinationEstimate, ...]
     directions: tuple[Direction, ...]
-    conditions: tuple[str, ...]
+    conditions: Mapping[str, tuple[str, ...]]
     sentences: tuple[str, ...]
 
 

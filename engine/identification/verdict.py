@@ -65,16 +65,15 @@ def verdict(
         and (estimate := _held_together(one, gradients[one.name], estimates, errors, vehicle))
     ]
     conditions = _conditions(estimates, combined, gradients, errors, released or {})
-    held = _if_held(conditions)
     return Verdict(
         parameters=classes,
         combinations=tuple(combined),
         directions=tuple(_directions(names, errors, gradients)),
         conditions=conditions,
         sentences=(
-            *_of_parameters(classes, held),
+            *_of_parameters(classes, conditions),
             *(
-                _of_combination(one, classes["yes"], bool(held))
+                _of_combination(one, classes["yes"], conditions)
                 for one in _news(combined, gradients, estimates)
             ),
         ),
@@ -83,7 +82,7 @@ def verdict(
 
 def without_verdict(estimates: Sequence[ParameterEstimate]) -> Verdict:
     """That on a fit whose errors mean nothing."""
-    return Verdict(by_class(estimates), (), (), (), ())
+    return Verdict(by_class(estimates), (), (), {}, ())
 
 
 def by_class(estimates: Sequence[ParameterEstimate]) -> dict[str, tuple[str, ...]]:
@@ -207,28 +206,31 @@ def _conditions(
     gradients: Mapping[str, Array],
     errors: Uncertainty,
     released: Mapping[str, Array],
-) -> tuple[str, ...]:
-    """What holds others, that are determined, to where they are by its bound.
+) -> dict[str, tuple[str, ...]]:
+    """What holds others, that are determined, to where they are by its bound, and which.
 
     One that drifts along what the runs leave open leaves the rest where it is.
     """
     axes = np.eye(len(estimates))
-    known = [axes[k] for k, one in enumerate(estimates) if one.determined != "no"]
-    known += [gradients[one.name] for one in combined if one.determined != "no"]
-    return tuple(
-        name
+    known = {one.name: axes[k] for k, one in enumerate(estimates) if one.determined != "no"}
+    known |= {one.name: gradients[one.name] for one in combined if one.determined != "no"}
+    moved_by = {
+        name: tuple(
+            of
+            for of, g in known.items()
+            if abs(float(g @ step)) > errors.quantile * errors.error_of(g)
+        )
         for name, step in released.items()
-        if any(abs(float(g @ step)) > errors.quantile * errors.error_of(g) for g in known)
-    )
+    }
+    return {name: moved for name, moved in moved_by.items() if moved}
 
 
-def _if_held(conditions: Sequence[str]) -> str:
-    """What is said after what is determined: ", if ... is where its bound puts it"."""
-    if not conditions:
-        return ""
-    one = len(conditions) == 1
+def _condition(of: Sequence[str], conditions: Mapping[str, Sequence[str]]) -> str:
+    """On which bounds some of what is determined hangs: "if ... is where its bound puts it"."""
+    holding = [_short(name) for name, moved in conditions.items() if {*moved} & {*of}]
+    one = len(holding) == 1
     where = "is where its bound puts it" if one else "are where their bounds put them"
-    return f", if {listed([_short(name) for name in conditions])} {where}"
+    return f"if {listed(holding)} {where}"
 
 
 def _short(name: str) -> str:
@@ -236,20 +238,32 @@ def _short(name: str) -> str:
     return parameter(name).symbol if name in ALL_NAMES else name
 
 
-def _of_parameters(classes: Mapping[str, Sequence[str]], held: str) -> list[str]:
+def _of_parameters(
+    classes: Mapping[str, Sequence[str]], conditions: Mapping[str, Sequence[str]]
+) -> list[str]:
     wording = {
-        "yes": f"Determined to better than 15 %{held}",
-        "weakly": f"Determined weakly, to between 15 and 50 %{held}",
+        "yes": "Determined to better than 15 %",
+        "weakly": "Determined weakly, to between 15 and 50 %",
         "no": "Not determined by these runs",
     }
-    return [
-        f"{said}: {', '.join(parameter(name).symbol for name in classes[word])}."
-        for word, said in wording.items()
-        if classes[word]
-    ]
+    held = {name for moved in conditions.values() for name in moved}
+    sentences = []
+    for word, said in wording.items():
+        free = [_short(name) for name in classes[word] if name not in held]
+        bound = [name for name in classes[word] if name in held]
+        parts = [f"{said}: {', '.join(free)}"] if free else []
+        if bound:
+            head = "" if free else f"{said}, "
+            symbols = ", ".join(map(_short, bound))
+            parts.append(f"{head}{_condition(bound, conditions)}: {symbols}")
+        if parts:
+            sentences.append(f"{'; '.join(parts)}.")
+    return sentences
 
 
-def _of_combination(one: CombinationEstimate, known: Sequence[str], held: bool) -> str:
+def _of_combination(
+    one: CombinationEstimate, known: Sequence[str], conditions: Mapping[str, Sequence[str]]
+) -> str:
     apart = [parameter(name).symbol for name in one.of if name not in known]
     low, high = one.confidence_interval
     half_width, unit = 0.5 * (high - low), after_number(one.unit)
@@ -258,6 +272,7 @@ def _of_combination(one: CombinationEstimate, known: Sequence[str], held: bool) 
     else:
         told = f"{one.value:.4g}{unit} to {in_percent(half_width / abs(one.value))}"
     are = "are determined only together" if len(apart) > 1 else "is determined better"
-    told += ", on the same condition" if held else ""
+    if any(one.name in moved for moved in conditions.values()):
+        told += f", {_condition([one.name], conditions)}"
     label = f"{one.label[0].lower()}{one.label[1:]}"
     return f"{listed(apart)} {are}, as {one.symbol}, the {label}: {told}."

@@ -225,12 +225,14 @@ def test_an_end_that_stands_alone_is_not_rounded_beyond_its_value(visitor, inter
     assert in_module(visitor, "intervals", "return m.span(a[0], 1);", interval) == shown
 
 
-@pytest.mark.parametrize("held", [[], ["rear.stabilizer_bar.stiffness"], None])
+@pytest.mark.parametrize("held", [{}, {"rear.stabilizer_bar.stiffness": ["d"]}, None])
 def test_what_a_bound_decides_is_not_marked_as_what_runs_determine(visitor, held):
     """A fit of an earlier version tells no conditions."""
-    body = """const marked = ["yes", "no"].map((word) => m.mark(word, { verdict: a[0] }));
+    body = """const marked = [["d", "yes"], ["K", "yes"], ["C", "no"]].map(([name, determined]) =>
+            m.mark({ name, determined }, { verdict: a[0] }));
         return marked.map(({ innerText, className, title }) => [innerText, className, title]);"""
-    well, not_at_all = in_module(visitor, "determined", body, {"conditions": held})
+    well, other, not_at_all = in_module(visitor, "determined", body, {"conditions": held})
+    assert other == ["well", "determined yes", "well determined"]
     assert not_at_all == ["not", "determined no", "not determined"]
     if held:
         assert well[:2] == ["well, if …", "determined yes conditional"]
