@@ -130,6 +130,16 @@ def guess(
     )
 
 
+def chosen_by_hand(column: Column, known: Statistics | None, name: str) -> Candidate:
+    """A column as the channel that a person chose for it, whatever it is called: in a unit and with
+    a sign by the rules of a guess.
+    """
+    info, (bare, stated) = channel(name), _stated_unit(column)
+    ending = tuple(dict.fromkeys(unit for one in readings(bare) for unit in one.ending))
+    taken = taken_unit(info, stated, ending, known, "choice")
+    return _candidate(info, 1.0, taken, column, known)
+
+
 def with_template(
     found: Guess,
     columns: Sequence[Column],

@@ -116,6 +116,20 @@ def test_columns_come_with_numbers_guess_reasons_and_candidates(visitor, kept):
     json.dumps(found, allow_nan=False)
 
 
+def test_a_column_is_asked_for_as_any_channel(visitor, kept):
+    """The pitch's numbers reach 3: as a height they are mm, whatever its header says."""
+    path = f"/measurements/{kept['id']}/columns"
+    [pitch] = [one for one in visitor.get(path).json()["columns"] if one["name"] == "Nickwinkel"]
+    asked = {"index": pitch["index"], "channel": "wheel.fl.z"}
+    found = visitor.get(f"{path}/candidate", params=asked).json()
+    assert (found["channel"], found["unit"], found["doubted"]) == ("wheel.fl.z", "mm", True)
+    reply = visitor.get(f"{path}/candidate", params=asked | {"channel": "wheel.z"})
+    assert reply.status_code == 422
+    assert "wheel.z" in reply.json()["detail"]
+    reply = visitor.get(f"{path}/candidate", params=asked | {"index": 9})
+    assert "There is no column 9" in reply.json()["detail"]
+
+
 def test_what_is_proposed_can_be_put_and_signs_are_offered(visitor, kept):
     path = f"/measurements/{kept['id']}"
     proposed = visitor.get(f"{path}/columns").json()["proposed"]

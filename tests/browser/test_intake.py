@@ -152,6 +152,35 @@ def test_a_foreign_csv_is_mapped_corrected_flipped_and_its_mapping_kept(visitor)
     visitor.settled()
 
 
+def test_a_column_without_a_unit_takes_it_from_its_numbers_when_chosen_by_hand(visitor):
+    """Oracle: the wheel's heights, which the file holds in m; in mm it would hardly move."""
+    page = visitor.page
+    visitor.click("#tab-measurements")
+    run = read_run(NATIVE)
+    in_m = foreign().decode().replace("Radweg VL [m]", "Kanal 7")
+    head, *lines = in_m.split("\n")
+    place = head.split(";").index("Kanal 7")
+    rows = [line.split(";") for line in lines]
+    for row, value in zip(rows, run["wheel.fl.z"][::10], strict=True):
+        row[place] = f"{value:.9f}".replace(".", ",")
+    add(visitor, "kanal.csv", "\n".join([head, *map(";".join, rows)]).encode())
+    open_next(visitor, ".mapping-table")
+    page.get_by_label("Channel of Kanal 7").focus()
+    page.get_by_label("Channel of Kanal 7").select_option("wheel.fl.z")
+    row = page.locator(".mapping-table tr", has_text="Kanal 7")
+    visitor.wait(lambda: "unit guessed" in row.inner_text(), "the service has told the unit")
+    assert page.get_by_label("Unit of Kanal 7").input_value() == "m"
+    assert "by hand" in row.inner_text()
+    # In the wrong one its doubt is in sight, not folded away.
+    page.get_by_label("Unit of Kanal 7").fill("mm")
+    page.get_by_label("Unit of Kanal 7").press("Tab")
+    visitor.click("#apply-mapping")
+    doubt = page.locator(".mapping-head .warnings li", has_text="wheel.fl.z stays within")
+    visitor.wait(doubt.is_visible, "the doubt is told")
+    assert "is it in m?" in doubt.inner_text()
+    visitor.settled()
+
+
 def test_binary_files_are_read_and_damaged_ones_refused_in_a_sentence(visitor, tmp_path):
     visitor.expect("status of 422")
     visitor.click("#tab-measurements")
