@@ -24,7 +24,7 @@ export async function open(row, itsHost) {
   const [found, kept] = await Promise.all([api.columns(row.id), api.mappings()]);
   const begin = found.mapping ?? found.proposed;
   at = { row, ...found, kept, rows: new Map(), shown: MOST_ROWS, filter: "", onlyMapped: false,
-    outcome: row.mapping ? row : null };
+    outcome: row.needs_mapping ? null : row };
   take(begin);
   at.applied = !row.needs_mapping;
   const first = found.columns.find((one) => at.entries.has(one.index) && doubt(at.entries.get(one.index), one))
@@ -105,7 +105,7 @@ function head() {
   parts.head.replaceChildren(
     h("p", { className: "hint" }, `${kind}, ${columns.length} column${columns.length === 1 ? "" : "s"}` +
       `${groups > 1 ? ` in ${groups} groups` : ""}. ${clocks()}`),
-    ...(outcome ? [h("p", { className: "strong" }, `Applied: ${outcome.channels.length} channels, ` +
+    ...(outcome?.mapping ? [h("p", { className: "strong" }, `Applied: ${outcome.channels.length} channels, ` +
       `${units.number(outcome.duration, 3)} s, a sample every ${units.number(1000 * outcome.sample_step, 3)} ms.`)] : []),
     ...(outcome?.sign_suggestions.length ? [h("ul", { className: "warnings signs" },
       outcome.sign_suggestions.map(signRow))] : []),
