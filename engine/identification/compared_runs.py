@@ -38,6 +38,7 @@ class ComparedRun:
     measured : channel -> (samples,) as read, through the output filter
     noise : channel -> standard deviation of what is read, SI
     noise_source : channel -> where that is from
+    warnings : sentences about the run
     """
 
     name: str
@@ -45,6 +46,7 @@ class ComparedRun:
     measured: Mapping[str, Array]
     noise: Mapping[str, float]
     noise_source: Mapping[str, NoiseSource]
+    warnings: tuple[str, ...] = ()
 
 
 def compared_runs(
@@ -105,13 +107,15 @@ def compared_runs(
                     f"Run {name} has gaps (not a number) in {channel}; leave the channel out."
                 )
         told = defaults | dict(run.noise) | typed
+        inputs = prepare(corrected(run, readings), vehicle, settings, unzeroed=sensors.unzeroed)
         found.append(
             ComparedRun(
                 name,
-                prepare(corrected(run, readings), vehicle, settings, unzeroed=sensors.unzeroed),
+                inputs,
                 compared,
                 {channel: float(told[channel]) for channel in compared},
                 {channel: _source(channel, run, typed) for channel in compared},
+                (*another_car(run, vehicle), *inputs.warnings),
             )
         )
     return tuple(found)
@@ -121,6 +125,16 @@ def _source(channel: str, run: Run, typed: Mapping[str, float]) -> NoiseSource:
     if channel in typed:
         return "typed"
     return "stated" if channel in run.noise else "default"
+
+
+def another_car(run: Run, vehicle: Vehicle) -> list[str]:
+    """A sentence where a run is known to be of another car than the one that follows it."""
+    if run.vehicle in ("", vehicle.name):
+        return []
+    return [
+        f"Run {run.name} was recorded with another car, {run.vehicle}, than the one that follows"
+        f" it, {vehicle.name}; leave it out unless they are the same."
+    ]
 
 
 def require_motion(runs: Sequence[Run], compared: Sequence[ComparedRun]) -> None:

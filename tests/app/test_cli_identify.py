@@ -181,6 +181,23 @@ def test_a_channel_with_the_wrong_sign_ends_in_a_warning_that_names_it(folder, d
     assert any("chassis.z" in line for line in warnings)
 
 
+def test_a_run_of_another_car_is_warned_of(folder, driven, capsys):
+    """Oracle: the car that the notes name, and the one that is fitted."""
+    write_run(read_run(driven), "lap.csv")
+    command = ["identify", "lap.csv", "--vehicle", "paper", "--free", "K_F"]
+    car = reference_vehicles()["paper"].name
+    said_of_it = "lap.csv was recorded with another car, BMW 320i"
+    for named, said in ((car, []), ("BMW 320i", [said_of_it])):
+        (folder / "lap.toml").write_text(f'vehicle = "{named}"')
+        assert main(command) == 0
+        printed = capsys.readouterr().out.splitlines()
+        warnings = [line for line in printed if "another car" in line]
+        assert len(warnings) == len(said)
+        for sentence, warning in zip(said, warnings, strict=True):
+            assert sentence in warning
+            assert f"than the one that follows it, {car}" in warning
+
+
 def test_a_turned_sensor_is_offered_as_an_option_that_mends_the_fit(folder, driven, capsys):
     """Oracle: the fit to the recording that is not turned, and its prediction by rims."""
     run = read_run(driven)
