@@ -197,10 +197,9 @@ def _readable(name: str) -> Iterator[None]:
     """A sentence in place of what else may happen to a file while it is read."""
     try:
         yield
-    except (RecursionError, MemoryError, OverflowError) as error:
+    except (RecursionError, MemoryError, OverflowError):
         raise MeasurementError(
-            f"{name}: the file is too large or too deep to read ({type(error).__name__}); "
-            "send a plain CSV."
+            f"{name}: the file is too large or too deep to read; send a plain CSV."
         ) from None
     except FileNotFoundError:
         raise NotFound(f"{name} has been deleted meanwhile; choose another measurement.") from None

@@ -182,7 +182,9 @@ def _entry(column: Column, one: Candidate) -> MappedColumn:
 
 
 def _candidates(column: Column, known: Statistics | None, clock: bool) -> list[Candidate]:
-    """What a column may be, the likeliest first."""
+    """What a column may be, the likeliest first; nothing where it holds no number."""
+    if known is not None and known.empty:
+        return []
     name, stated = _stated_unit(column)
     own = find_channel(name.strip().lower())
     found: dict[str, tuple[float, tuple[str, ...]]] = {}
