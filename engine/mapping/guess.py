@@ -118,7 +118,8 @@ def guess(
         ]
         if rivals and one.channel != "time":
             also = f"{one.reason}; {', '.join(rivals[:3])} fit{'s' * (len(rivals) == 1)} as well"
-            chosen[index] = replace(one, confidence=0.85 * one.confidence, reason=also)
+            less = max(THRESHOLD, 0.85 * one.confidence)
+            chosen[index] = replace(one, confidence=less, reason=also)
     mapping = ChannelMapping(
         tuple(_entry(columns[index], chosen[index]) for index in sorted(chosen))
     )

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from ridetune.engine.channels import CHANNELS, channel
 from ridetune.engine.formats.csv_file import CsvFile
@@ -173,6 +173,7 @@ def test_words_of_a_channel_are_found_however_they_are_written(data):
 
 @settings(max_examples=200, deadline=None)
 @given(st.lists(st.tuples(st.text(max_size=60), st.text(max_size=12)), min_size=1, max_size=6))
+@example([("uV0gB", ""), ("uV0gB", "")])
 def test_any_header_is_taken_without_failing_and_no_channel_twice(header):
     found = guess([Column(name, unit, 100) for name, unit in header], {})
     channels = [one.channel for one in found.mapping.columns]
