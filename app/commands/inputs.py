@@ -24,6 +24,9 @@ from .arguments import braking, mappings, run_and_file
 
 Known = TypeVar("Known")
 
+ALIKE = 0.75
+"""Likeness from which a name is taken for a slip in writing another: one letter in four."""
+
 ELSEWHERE = {
     ".csv": "CSV recordings go with --rims or to identify, posts with --posts, roads with --road",
     ".toml": "notes in TOML lie beside their recording, sensors go with --sensors of campaign",
@@ -61,7 +64,7 @@ def _is_file(name: str) -> bool:
 def _known(name: str, known: Mapping[str, Known], kind: type[RideError], noun: str) -> Known:
     if name in known:
         return known[name]
-    near = get_close_matches(name, known, n=1)
+    near = get_close_matches(name, known, n=1, cutoff=ALIKE)
     hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}."
     raise kind(f"{name}: there is no such file, nor a {noun} of that name; {hint}")
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import OUTPUT_CHANNELS
+from ..channels import OUTPUT_CHANNELS, conditioned_first
 from ..errors import ProblemError
 from ..filters import low_pass, too_coarse
 from ..run import Run
@@ -96,7 +96,8 @@ def compared_runs(
         measured = filtered_outputs(where_driven(run, readings), settings.output_band)
         if not measured:
             raise ProblemError(
-                f"Run {name} has none of {', '.join(OUTPUT_CHANNELS)}; at least one is needed."
+                f"Run {name} has none of {', '.join(OUTPUT_CHANNELS)}; at least one is needed"
+                f"{conditioned_first(run.columns)}."
             )
         compared = {
             channel: measured[channel] for channel in _chosen_channels(name, measured, chosen)
