@@ -1,6 +1,6 @@
 """The columns of an uploaded file as the REST interface shows them, with what they may be."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +9,7 @@ from .frames import clean
 
 if TYPE_CHECKING:
     from ..engine.formats.child import ChildTable
-    from ..engine.formats.table import Table
+    from ..engine.formats.table import Column, Table
     from ..engine.mapping.numbers import Statistics
     from ..engine.mapping.survey import Survey
 
@@ -63,17 +63,28 @@ def _numbers(known: "Statistics | None") -> dict[str, Any]:
     }
 
 
+def candidate_to_json(found: "Survey", index: int, channel: str) -> dict[str, Any]:
+    """A column as the channel that a person chose for it."""
+    from ..engine.mapping.guess import chosen_by_hand
+
+    _require_column(found.columns, index)
+    return asdict(chosen_by_hand(found.columns[index], found.known.get(index), channel))
+
+
+def _require_column(columns: "Sequence[Column]", index: int) -> None:
+    if not 0 <= index < len(columns):
+        raise InvalidRequest(
+            f"There is no column {index}; they go from 0 to {len(columns) - 1}.", field="index"
+        )
+
+
 def preview(table: "ChildTable", indices: Iterable[int], points: int) -> list[dict[str, Any]]:
     """Least and greatest value of some columns, in the file's numbers, over at most so many
     stretches. The child looks at the numbers; few of them come back.
     """
     shown = []
     for index in indices:
-        if not 0 <= index < len(table.columns):
-            raise InvalidRequest(
-                f"There is no column {index}; they go from 0 to {len(table.columns) - 1}.",
-                field="index",
-            )
+        _require_column(table.columns, index)
         seen, (unit, factor) = table.envelope(index, points), _clock_unit(table, index)
         shown.append(
             {

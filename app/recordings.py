@@ -197,10 +197,9 @@ def _readable(name: str) -> Iterator[None]:
     """A sentence in place of what else may happen to a file while it is read."""
     try:
         yield
-    except (RecursionError, MemoryError, OverflowError) as error:
+    except (RecursionError, MemoryError, OverflowError):
         raise MeasurementError(
-            f"{name}: the file is too large or too deep to read ({type(error).__name__}); "
-            "send a plain CSV."
+            f"{name}: the file is too large or too deep to read; send a plain CSV."
         ) from None
     except FileNotFoundError:
         raise NotFound(f"{name} has been deleted meanwhile; choose another measurement.") from None
@@ -289,19 +288,15 @@ def summary(
 ) -> dict[str, Any]:
     """What a person wants to know of a recording before using it.
 
-    mapping : that of its columns, whose signs are looked at; None where they go by their names
+    mapping : that of its columns, in which signs may be confirmed; None for our own names
     raw : the recording before anything was done to it, where that is another
     """
+    from ..engine.mapping.mapping import mapping_from_json
+    from ..engine.mapping.signs import check_signs
     from ..engine.measurement import missing_for_identification
 
     missing = list(missing_for_identification(run))
-    suggestions = []
-    if mapping is not None:
-        from ..engine.mapping.mapping import mapping_from_json
-        from ..engine.mapping.signs import check_signs
-
-        sure = mapping_from_json(mapping).sure_signs
-        suggestions = [asdict(one) for one in check_signs(run, sure)]
+    sure = () if mapping is None else mapping_from_json(mapping).sure_signs
     return {
         "needs_mapping": False,
         "samples": len(run.time),
@@ -311,7 +306,7 @@ def summary(
         "warnings": list(run.warnings),
         "usable_for_identification": not missing,
         "missing": missing,
-        "sign_suggestions": suggestions,
+        "sign_suggestions": [asdict(one) for one in check_signs(run, sure)],
         "data_sha256": _digest(raw or run),
         "vehicle": run.vehicle or None,
     }

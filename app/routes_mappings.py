@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Body, Query, Response
 
 from .access import SessionId
-from .columns import columns_to_json, preview
+from .columns import candidate_to_json, columns_to_json, preview
 from .downloads import saved_as
 from .errors import NotFound
 from .measurement_view import measurement_to_json
@@ -42,6 +42,17 @@ def _columns(services: Services, sid: str, mid: str) -> dict[str, Any]:
     }
     found = services.recordings.survey(kept).with_templates(templates)
     return columns_to_json(found, kept.mapping)
+
+
+@router.get("/measurements/{mid}/columns/candidate")
+async def candidate(
+    sid: SessionId, mid: str, services: Shared, index: int, channel: str
+) -> dict[str, Any]:
+    """A column as a channel that a person chooses for it: its unit and sign, and why."""
+    kept = services.store.measurement(sid, mid)
+    return await services.readers.run(
+        sid, lambda: candidate_to_json(services.recordings.survey(kept), index, channel)
+    )
 
 
 @router.get("/measurements/{mid}/columns/preview")

@@ -358,3 +358,16 @@ def near_channel(name: str) -> str | None:
 
 def _bare(name: str) -> str:
     return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+_RAW = re.compile(r"chassis\.(body_a_[xyz]|a_z|pitch_rate|roll_rate)|wheel\.\w+\.a_z")
+
+
+def conditioned_first(names: Iterable[str]) -> str:
+    """What to do with a run that lacks what a fit needs, where gyros and accelerometers are among
+    its channels: the end of a sentence, else empty.
+    """
+    raw = [name for name in names if _RAW.fullmatch(name)]
+    if not raw:
+        return ""
+    return f"; make them of raw sensors such as {raw[0]} first, with ridetune condition"

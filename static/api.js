@@ -149,6 +149,9 @@ export const columns = (id) => json("GET", `${base}/measurements/${id}/columns`)
 /** Least and greatest values of one column, in the file's numbers. */
 export const columnPreview = async (id, index, points) =>
   (await json("GET", `${base}/measurements/${id}/columns/preview?index=${index}&points=${points}`))[0];
+/** One column as a channel that a person chooses for it: unit, sign, reason. */
+export const columnAs = (id, index, channel) =>
+  json("GET", `${base}/measurements/${id}/columns/candidate?index=${index}&channel=${encodeURIComponent(channel)}`);
 export const setMapping = (id, mapping) =>
   json("PUT", `${base}/measurements/${id}/mapping`, { body: mapping });
 export const forgetMapping = (id) => json("DELETE", `${base}/measurements/${id}/mapping`);

@@ -24,7 +24,7 @@ export async function open(row, itsHost) {
   const [found, kept] = await Promise.all([api.columns(row.id), api.mappings()]);
   const begin = found.mapping ?? found.proposed;
   at = { row, ...found, kept, rows: new Map(), shown: MOST_ROWS, filter: "", onlyMapped: false,
-    outcome: row.mapping ? row : null };
+    outcome: row.needs_mapping ? null : row };
   take(begin);
   at.applied = !row.needs_mapping;
   const first = found.columns.find((one) => at.entries.has(one.index) && doubt(at.entries.get(one.index), one))
@@ -105,13 +105,12 @@ function head() {
   parts.head.replaceChildren(
     h("p", { className: "hint" }, `${kind}, ${columns.length} column${columns.length === 1 ? "" : "s"}` +
       `${groups > 1 ? ` in ${groups} groups` : ""}. ${clocks()}`),
-    ...(outcome ? [h("p", { className: "strong" }, `Applied: ${outcome.channels.length} channels, ` +
+    ...(outcome?.mapping ? [h("p", { className: "strong" }, `Applied: ${outcome.channels.length} channels, ` +
       `${units.number(outcome.duration, 3)} s, a sample every ${units.number(1000 * outcome.sample_step, 3)} ms.`)] : []),
     ...(outcome?.sign_suggestions.length ? [h("ul", { className: "warnings signs" },
       outcome.sign_suggestions.map(signRow))] : []),
-    ...(said.length ? [h("details", { className: "fold", open: said.length < 4 && !outcome?.sign_suggestions.length },
-      h("summary", {}, `${said.length} warning${said.length > 1 ? "s" : ""}`),
-      h("ul", { className: "warnings" }, said.map((text) => h("li", {}, text))))] : []));
+    ...(said.length ? [h("ul", { className: "warnings", "aria-label": "Warnings" },
+      said.map((text) => h("li", {}, text)))] : []));
 }
 
 function signRow({ channel, sentence }) {
@@ -278,7 +277,9 @@ function channelSelect(column) {
 /** Keys on a closed list choose as they pass, so that no other column loses its channel by it. */
 function choose(column, channel) {
   const before = at.entries.get(column.index)?.channel;
-  if (channel) at.entries.set(column.index, entryFor(column, channel));
+  const likely = column.candidates.find((one) => one.channel === channel);
+  if (likely) at.entries.set(column.index, entryFor(column, likely));
+  else if (channel) ask(column, channel);
   else at.entries.delete(column.index);
   const others = [...at.entries].filter(([, one]) => [before, channel].includes(one.channel)).map(([index]) => index);
   touched(column.index, ...others);
@@ -286,6 +287,25 @@ function choose(column, channel) {
   if (twice !== undefined) {
     host.say("doubt", `${at.columns[twice].name} is ${channel}, too; keep one of the two.`);
   }
+}
+
+/** An entry that nobody guessed; its unit and sign are the service's to find by the numbers. */
+function ask(column, channel) {
+  const mine = at;
+  const entry = entryFor(column, { channel, unit: "", sign: 1, confidence: null, doubted: false, reason: BY_HAND });
+  const answered = async () => {
+    try {
+      const found = await api.columnAs(mine.row.id, column.index, channel);
+      // Another choice meanwhile, or a unit that was typed, goes before the answer.
+      if (mine.entries.get(column.index) !== entry) return;
+      mine.entries.set(column.index, entryFor(column, { ...found, confidence: null }));
+      if (mine === at) touched(column.index);
+    } catch (error) {
+      host.refused(error);
+    }
+  };
+  at.entries.set(column.index, entry);
+  at.asked = Promise.all([at.asked, answered()]);
 }
 
 /** The doubt about the entry of a column, or that its channel is that of another one, too. */
@@ -398,6 +418,7 @@ function whole() {
 
 async function apply() {
   host.say("", "Applying …");
+  await at.asked;
   try {
     at.row = await api.setMapping(at.row.id, whole());
   } catch (error) {

@@ -3,8 +3,6 @@
 // An entry is {channel, unit, sign, gain, missing, note, confidence, doubted}; `confidence` is null
 // for one that a person made.
 
-import * as units from "./units.js";
-
 export const BY_HAND = "set by hand";
 /** Confidence below which an entry is worth a look. */
 const UNSURE = 0.7;
@@ -53,17 +51,10 @@ export function entriesOf(mapping, columns) {
   return { entries, lost };
 }
 
-/** The entry of a column as a channel that was chosen for it. */
-export function entryFor(column, channel) {
-  const likely = column.candidates.find((one) => one.channel === channel);
+/** The entry of a column as the channel that a candidate names. */
+export function entryFor(column, { channel, unit, sign, confidence, doubted, reason }) {
   const missing = column.stand_ins.length ? column.stand_ins.map(({ value }) => value) : null;
-  const entry = { channel, gain: 1, missing };
-  if (likely) {
-    const { unit, sign, confidence, doubted, reason } = likely;
-    return { ...entry, unit, sign, confidence, doubted, note: reason };
-  }
-  const unit = column.unit || units.channel(channel).display_unit.replace("²", "^2");
-  return { ...entry, unit, sign: 1, confidence: null, doubted: false, note: BY_HAND };
+  return { channel, unit, sign, gain: 1, missing, confidence, doubted, note: reason };
 }
 
 /** The columns of a mapping as the service takes it. */

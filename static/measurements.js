@@ -128,8 +128,8 @@ async function take(file) {
   const copied = first ? [`It holds the same data as ${nameOf(first.id)} and is left out of fits until its use is ` +
     "chosen; fitted beside the other it would count twice."] : [];
   if (stage !== "ready") {
-    parts.dismiss = notice("warning", `${nameOf(row.id)} is in`, [`${lacks(row)}.`, ...copied].join(" "),
-      { label: TO_DO[stage], run: () => { hooks.open(); show(); intake.open(row.id, stage); } });
+    parts.dismiss = notice("warning", `${nameOf(row.id)} is in`, [stageTold(row, stage), ...copied].join(" "),
+      { label: toDo(row, stage), run: () => { hooks.open(); show(); intake.open(row.id, stage); } });
     return;
   }
   const { length } = row.warnings;
@@ -139,8 +139,12 @@ async function take(file) {
     length ? { label: `See ${warned(length)}`, run: () => showWarnings(row.id) } : null);
 }
 
-/** The next thing to do, by stage. */
-const TO_DO = { channels: "Map columns", conditioning: "Condition" };
+/** The next thing to do at a stage. */
+const toDo = ({ needs_mapping: unmapped }, stage) =>
+  stage === "conditioning" ? "Condition" : unmapped ? "Map columns" : "Check signs";
+
+/** What is told of a recording's stage. */
+const stageTold = (row, stage) => stagesOf(row).find(({ key }) => key === stage).told;
 
 const warned = (count) => `${count} warning${count > 1 ? "s" : ""}`;
 
@@ -277,7 +281,7 @@ function detail(row) {
     h("div", { className: "row-tools" },
       h("strong", { className: "name" }, breakable(nameOf(row.id))),
       stage === "ready" ? null : h("button", { type: "button", className: "primary", id: "next-stage",
-        on: { click: () => work(stage) } }, stage === "channels" && row.mapping ? "Check signs" : TO_DO[stage]),
+        on: { click: () => work(stage) } }, toDo(row, stage)),
       row.usable_for_identification
         ? h("button", { type: "button", className: stage === "ready" ? "primary" : "",
             on: { click: () => choose(`measurement ${row.id}`) } }, "Use as ride")
@@ -291,7 +295,7 @@ function detail(row) {
     stepper(row, work),
     downloads(row),
     stage === "ready" ? null
-      : h("p", { className: "hint" }, stagesOf(row).find(({ key }) => key === stage).told),
+      : h("p", { className: "hint" }, stageTold(row, stage)),
     ...(names.length ? [h("div", { className: "row-tools" }, choice, facts), drawing] : []),
     h("p", { className: "hint" }, sentence(row)),
     h("p", { className: "hint" }, driven(row), row.manoeuvre

@@ -44,7 +44,7 @@ def advise(options: Namespace) -> None:
     else:
         vehicle = find_vehicle(options.vehicle)
         found = advise_unmeasured(vehicle, candidates, planned=planned, noise=noise)
-        print("Without recordings, nothing is known but what is planned.")
+        print(_without_runs(options.vehicle))
     print_advisory(found)
     if options.json:
         write_file(options.json, json.dumps(advisory_to_json(found), indent=2) + "\n")
@@ -85,6 +85,16 @@ def _problem(options: Namespace, noise: Mapping[str, float]) -> Problem:
         priors=fit.priors,
         sensors=fit.sensors,
     ).as_fitted(fit.ended)
+
+
+def _without_runs(vehicle: str) -> str:
+    """What is known where no run is given, of a car or of a fit."""
+    if _is_json(vehicle) and is_fit(read_json(Path(vehicle), VehicleError)):
+        return (
+            f"What {Path(vehicle).name} knows counts only together with its runs: give them as RUN;"
+            " without them, nothing is known but what is planned."
+        )
+    return "Without recordings, nothing is known but what is planned."
 
 
 def _is_json(name: str) -> bool:

@@ -33,7 +33,7 @@ def channels(options: Namespace) -> None:
             if any(one.channel != "time" for one in mapping.columns):
                 warnings += _findings(options.recording, mapping)
         except MeasurementError as error:
-            warnings.append(str(error))
+            warnings.append(str(error).removeprefix(f"{found.source}: "))
     else:
         mapping = given.flipped(options.flip)
         warnings += _findings(options.recording, mapping)

@@ -43,6 +43,8 @@ def condition(options: Namespace) -> None:
         write_file(options.output, run_to_csv(done))
         write_file(notes_beside(Path(options.output)), notes_of(done))
         print(f"Wrote {options.output}, and what was done beside it.")
+    else:
+        print("Nothing was written; add -o run.csv to keep the run.")
 
 
 def _lacking(suggestion: Suggestion) -> list[str]:

@@ -21,6 +21,7 @@ from .arguments import starts as start_values
 from .inputs import (
     find_mappings,
     find_vehicle,
+    held_bounds,
     mapping_files,
     read_noise,
     read_runs,
@@ -66,13 +67,21 @@ def asked(
 
     noise : that --noise gives, of channels that are compared and others
     """
+    free, start = _free(options), start_values(options.start)
+    found = [parameter(name).name for name in free or PARAMETER_NAMES]
+    fixed = [parameter(name).name for name in options.fixed or ()]
+    held = {
+        name: ends
+        for name, ends in held_bounds(options.vehicle).items()
+        if name in found and name not in fixed and name not in start
+    }
     return Problem.build(
         vehicle,
         runs,
-        _free(options),
+        free,
         options.fixed or None,
-        bounds=bounds(options.bounds),
-        start=start_values(options.start),
+        bounds=held | bounds(options.bounds),
+        start=start,
         noise={name: one for name, one in noise.items() if name in OUTPUT_CHANNELS},
         traction=options.traction or "exact",
         settings=rims_settings(options),

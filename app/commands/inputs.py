@@ -13,6 +13,8 @@ from ...engine.errors import (
     UnmappedError,
     VehicleError,
 )
+from ...engine.identification.kept_fit import fit_from_json, is_fit
+from ...engine.json_text import read_json
 from ...engine.manoeuvre import Manoeuvre, read_manoeuvre, reference_manoeuvres
 from ...engine.mapping.mapping import ChannelMapping, read_mapping
 from ...engine.mapping.reading import read_recording
@@ -23,6 +25,9 @@ from ...engine.vehicle_file import read_vehicle, reference_vehicles
 from .arguments import braking, mappings, run_and_file
 
 Known = TypeVar("Known")
+
+ALIKE = 0.75
+"""Likeness from which a name is taken for a slip in writing another: one letter in four."""
 
 ELSEWHERE = {
     ".csv": "CSV recordings go with --rims or to identify, posts with --posts, roads with --road",
@@ -37,6 +42,18 @@ def find_vehicle(name: str) -> Vehicle:
         _require_json(name, VehicleError, "vehicle")
         return read_vehicle(name)
     return _known(name, reference_vehicles(), VehicleError, "vehicle")
+
+
+def held_bounds(name: str) -> dict[str, tuple[float, float]]:
+    """(lower, upper) of the parameters that ended at a bound of the fit which a vehicle is; nothing
+    where it is none. Default bounds would follow such a start eightfold beyond, fit after fit.
+    """
+    data = read_json(Path(name), VehicleError) if _is_file(name) else None
+    if not is_fit(data):
+        return {}
+    fit = fit_from_json(data, Path(name).name)
+    at_bound = {one["name"] for one in fit.ended["parameters"] if one.get("at_bound")}
+    return {one.name: (one.lower, one.upper) for one in fit.free if one.name in at_bound}
 
 
 def find_manoeuvre(name: str) -> Manoeuvre:
@@ -61,7 +78,7 @@ def _is_file(name: str) -> bool:
 def _known(name: str, known: Mapping[str, Known], kind: type[RideError], noun: str) -> Known:
     if name in known:
         return known[name]
-    near = get_close_matches(name, known, n=1)
+    near = get_close_matches(name, known, n=1, cutoff=ALIKE)
     hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}."
     raise kind(f"{name}: there is no such file, nor a {noun} of that name; {hint}")
 

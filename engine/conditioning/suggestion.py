@@ -12,6 +12,7 @@ from ..frames import CORNERS, Corner
 from ..known_band import TIMES_LOWEST
 from ..run import Run
 from ..spikes import spike_samples
+from ..units import listed
 from ..vehicle import Vehicle
 from .calibration import Rest, speeds, standstill
 from .chain import Step, condition
@@ -211,7 +212,8 @@ class _Chain:
     def _integrate(self, *names: str) -> None:
         targets = [TARGETS[name] for name in names]
         high = min(HIGHEST, 0.2 * self.rate)
-        reason = f"{', '.join(names)} give {', '.join(targets)} in a band."
+        give = "give" if len(names) > 1 else "gives"
+        reason = f"{listed(names)} {give} {listed(targets)} in a band."
         self.add(Displacement(names, (self.low, high)), reason, *targets)
         self.lows.append(self.low)
 

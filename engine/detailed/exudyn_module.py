@@ -21,7 +21,10 @@ def missing_exudyn() -> str:
     if find_spec("exudyn") is not None:
         return ""
     how = how_to_install("detailed")
-    return f"The detailed car is solved by Exudyn, which is not installed; {how}."
+    return (
+        f"The detailed car is solved by Exudyn, which is not installed; {how}, and start a running"
+        " service again."
+    )
 
 
 def require_exudyn() -> tuple[Any, Any]:

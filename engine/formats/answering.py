@@ -54,8 +54,8 @@ class Answering:
                 return self._out_of_memory()
             kind = f" as {self._kind}" if self._kind else ""
             return self._error(
-                f"the file cannot be read{kind} ({type(error).__name__}); it is damaged, cut short"
-                " or written in an unusual way, so export it again"
+                f"the file cannot be read{kind}; it is damaged, cut short or written in an unusual"
+                " way, so export it again"
             )
 
     def _out_of_memory(self) -> Answer:

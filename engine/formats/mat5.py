@@ -35,6 +35,12 @@ MOST_RECORDS = 1000
 LARGEST = 1_000_000_000
 """Longest MAT 5 file, bytes; a variable is read as a whole."""
 
+CUT = (
+    "is cut short, since the file ends within it; what came after it is missing, so transfer the"
+    " file again"
+)
+"""Why the last variable of a file that was cut is not read."""
+
 _NUMERIC = frozenset(
     ("double", "single")
     + tuple(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))
@@ -56,7 +62,8 @@ class Mat5File(Table):
     def __init__(self, path: Path, source: str, kind: str):
         self.source, self.kind, self.comment = source, kind, ""
         self._path = path
-        if path.stat().st_size > LARGEST:
+        size = path.stat().st_size
+        if size > LARGEST:
             raise MeasurementError(
                 f"{source}: a MAT 5 file of more than {LARGEST / 1e9:g} GB is not read; save it"
                 ' with "-v7.3".'
@@ -65,7 +72,10 @@ class Mat5File(Table):
         self._found: list[tuple[tuple[str, ...], Column, Any]] = []
         with path.open("rb") as stream:
             for head in heads(stream):
-                self._variable(head)
+                if head.begin + head.length > size:
+                    self._listing.leave_out(head.name or "a variable", CUT)
+                else:
+                    self._variable(head)
         self._listing.add_timed(self._found)
         self.columns, self.warnings = self._listing.columns(), self._listing.warnings()
         self._places = self._listing.places

@@ -27,7 +27,7 @@ _CLASSES = (
 class Head(NamedTuple):
     """One variable; shape is () where it has none.
 
-    begin, length : of its element with its type and length, bytes
+    begin, length : of its element with its type and length, bytes; a file that was cut ends before
     """
 
     name: str
@@ -54,13 +54,24 @@ def heads(stream: BinaryIO) -> Iterator[Head]:
         kind, length = struct.unpack(f"{order}II", tag)
         start = stream.tell()
         data = stream.read(min(length, LONGEST_HEAD))
-        if kind == COMPRESSED:
-            data = zlib.decompressobj().decompress(data, LONGEST_HEAD)
-            kind, data = struct.unpack_from(f"{order}I", data)[0], data[8:]
-        if kind != MATRIX:
-            raise ValueError("type of element")
-        yield Head(*_head(data, order), start - 8, 8 + length)
+        place = start - 8, 8 + length
+        try:
+            yield Head(*_variable(kind, data, order), *place)
+        except struct.error:
+            if len(data) == min(length, LONGEST_HEAD):
+                raise
+            yield Head("", "", (), False, *place)
         stream.seek(start + length)
+
+
+def _variable(kind: int, data: bytes, order: str) -> tuple[str, str, tuple[int, ...], bool]:
+    """Name, class, dimensions and whether it is complex, by the first bytes of an element."""
+    if kind == COMPRESSED:
+        data = zlib.decompressobj().decompress(data, LONGEST_HEAD)
+        kind, data = struct.unpack_from(f"{order}I", data)[0], data[8:]
+    if kind != MATRIX:
+        raise ValueError("type of element")
+    return _head(data, order)
 
 
 def _head(data: bytes, order: str) -> tuple[str, str, tuple[int, ...], bool]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import OUTPUT_CHANNELS
+from ..channels import OUTPUT_CHANNELS, conditioned_first
 from ..errors import ProblemError
 from ..filters import low_pass, too_coarse
 from ..run import Run
@@ -38,6 +38,7 @@ class ComparedRun:
     measured : channel -> (samples,) as read, through the output filter
     noise : channel -> standard deviation of what is read, SI
     noise_source : channel -> where that is from
+    warnings : sentences about the run
     """
 
     name: str
@@ -45,6 +46,7 @@ class ComparedRun:
     measured: Mapping[str, Array]
     noise: Mapping[str, float]
     noise_source: Mapping[str, NoiseSource]
+    warnings: tuple[str, ...] = ()
 
 
 def compared_runs(
@@ -94,7 +96,8 @@ def compared_runs(
         measured = filtered_outputs(where_driven(run, readings), settings.output_band)
         if not measured:
             raise ProblemError(
-                f"Run {name} has none of {', '.join(OUTPUT_CHANNELS)}; at least one is needed."
+                f"Run {name} has none of {', '.join(OUTPUT_CHANNELS)}; at least one is needed"
+                f"{conditioned_first(run.columns)}."
             )
         compared = {
             channel: measured[channel] for channel in _chosen_channels(name, measured, chosen)
@@ -105,13 +108,15 @@ def compared_runs(
                     f"Run {name} has gaps (not a number) in {channel}; leave the channel out."
                 )
         told = defaults | dict(run.noise) | typed
+        inputs = prepare(corrected(run, readings), vehicle, settings, unzeroed=sensors.unzeroed)
         found.append(
             ComparedRun(
                 name,
-                prepare(corrected(run, readings), vehicle, settings, unzeroed=sensors.unzeroed),
+                inputs,
                 compared,
                 {channel: float(told[channel]) for channel in compared},
                 {channel: _source(channel, run, typed) for channel in compared},
+                (*another_car(run, vehicle), *inputs.warnings),
             )
         )
     return tuple(found)
@@ -121,6 +126,16 @@ def _source(channel: str, run: Run, typed: Mapping[str, float]) -> NoiseSource:
     if channel in typed:
         return "typed"
     return "stated" if channel in run.noise else "default"
+
+
+def another_car(run: Run, vehicle: Vehicle) -> list[str]:
+    """A sentence where a run is known to be of another car than the one that follows it."""
+    if run.vehicle in ("", vehicle.name):
+        return []
+    return [
+        f"Run {run.name} was recorded with another car, {run.vehicle}, than the one that follows"
+        f" it, {vehicle.name}; leave it out unless they are the same."
+    ]
 
 
 def require_motion(runs: Sequence[Run], compared: Sequence[ComparedRun]) -> None:

@@ -146,7 +146,7 @@ def identify(
         released = _released(solution, [*parameters, *sensors], problem)
         judged = verdict(parameters, errors, vehicle, released)
     warnings = [
-        *(warning for seen in problem.runs for warning in seen.inputs.warnings),
+        *(warning for seen in problem.runs for warning in seen.warnings),
         *moved,
         *faults,
     ]

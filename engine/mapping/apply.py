@@ -59,12 +59,14 @@ def apply(
     time, numbers, said = joined(series, source, None if times.assumed else mapping.step)
     warnings += said
     require_samples(time.size, source)
-    warnings += doubtful_time(time)
     values = dict(zip(found, numbers, strict=True))
+    doubts = doubtful_time(time)
     for name, (entry, _) in found.items():
         info = channel(name)
         factor, _ = to_si(entry.unit, info.unit)
-        warnings += doubtful_magnitude(info, entry.unit, factor, time, values[name])
+        doubts += doubtful_magnitude(info, entry.unit, factor, time, values[name])
+    # What makes the run useless goes before what is odd in the file.
+    warnings = [*doubts, *warnings]
     known = checked_noise(noise or {}, source)
     warnings += doubtful_noise(known, values)
     return Run(source, time, values, known, tuple(warnings), description)

@@ -118,7 +118,8 @@ def guess(
         ]
         if rivals and one.channel != "time":
             also = f"{one.reason}; {', '.join(rivals[:3])} fit{'s' * (len(rivals) == 1)} as well"
-            chosen[index] = replace(one, confidence=0.85 * one.confidence, reason=also)
+            less = max(THRESHOLD, 0.85 * one.confidence)
+            chosen[index] = replace(one, confidence=less, reason=also)
     mapping = ChannelMapping(
         tuple(_entry(columns[index], chosen[index]) for index in sorted(chosen))
     )
@@ -128,6 +129,16 @@ def guess(
         tuple(tuple(offered[:MOST_CANDIDATES]) for offered in candidates),
         tuple(_warnings(columns, known, chosen)),
     )
+
+
+def chosen_by_hand(column: Column, known: Statistics | None, name: str) -> Candidate:
+    """A column as the channel that a person chose for it, whatever it is called: in a unit and with
+    a sign by the rules of a guess.
+    """
+    info, (bare, stated) = channel(name), _stated_unit(column)
+    ending = tuple(dict.fromkeys(unit for one in readings(bare) for unit in one.ending))
+    taken = taken_unit(info, stated, ending, known, "choice")
+    return _candidate(info, 1.0, taken, column, known)
 
 
 def with_template(
@@ -172,7 +183,9 @@ def _entry(column: Column, one: Candidate) -> MappedColumn:
 
 
 def _candidates(column: Column, known: Statistics | None, clock: bool) -> list[Candidate]:
-    """What a column may be, the likeliest first."""
+    """What a column may be, the likeliest first; nothing where it holds no number."""
+    if known is not None and known.empty:
+        return []
     name, stated = _stated_unit(column)
     own = find_channel(name.strip().lower())
     found: dict[str, tuple[float, tuple[str, ...]]] = {}

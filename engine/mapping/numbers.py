@@ -3,7 +3,7 @@
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -75,6 +75,11 @@ class Statistics:
     clipped: tuple[float, ...] = ()
 
     @property
+    def empty(self) -> bool:
+        """Whether no sample is a number."""
+        return self.samples == self.missing
+
+    @property
     def level(self) -> float:
         """Magnitude of the median."""
         return abs(self.median)
@@ -83,6 +88,12 @@ class Statistics:
     def constant(self) -> bool:
         """Whether the column never changes, or holds nothing."""
         return not self.minimum < self.maximum
+
+
+def unreadable(samples: int) -> Statistics:
+    """Of a column whose numbers cannot be read."""
+    nan = math.nan
+    return Statistics(samples, nan, nan, nan, nan, nan, nan, samples)
 
 
 def statistics(values: Array) -> Statistics:
@@ -98,8 +109,7 @@ def _statistics(values: Array) -> Statistics:
     if found:
         finite = finite[~np.isin(finite, [one.value for one in found])]
     if not finite.size:
-        nan = math.nan
-        return Statistics(values.size, nan, nan, nan, nan, nan, nan, missing, found)
+        return replace(unreadable(values.size), missing=missing, stand_ins=found)
     median = float(np.median(finite))
     peak, swing = (
         float(np.percentile(np.abs(one), CENTRAL[1])) for one in (finite, finite - median)

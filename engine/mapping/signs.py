@@ -42,6 +42,9 @@ TELLS = 0.5
 EACH_FLIP = 0.15
 """What turning a channel over must gain in correlation."""
 
+PER_PERIOD = 20
+"""Samples in a period at SLOW that are looked at, which is enough for what lies below."""
+
 LONGEST_SHARE = 0.25
 """Share of a record's length that one period at SLOW may have."""
 
@@ -125,11 +128,13 @@ def _slow_motion(run: Run) -> dict[str, Array]:
     if not names:
         return {}
     slow = low_pass(run.time, np.column_stack([run[name] for name in names]), SLOW)
+    thin = slice(None, None, max(1, int(1.0 / (PER_PERIOD * SLOW * step))))
+    time, slow = run.time[thin], slow[thin]
     found = {name: slow[:, k] - slow[:, k].mean() for k, name in enumerate(names)}
     speed = found.pop("chassis.v_x", None)
     moving = {name: values for name, values in found.items() if np.std(values) >= MOVES[name]}
     if speed is not None:
-        gained = np.gradient(speed, run.time)
+        gained = np.gradient(speed, time)
         # A car that drives backwards has v_x below zero and its change the right way round.
         if np.std(gained) >= GAINS:
             moving["speed"] = gained - gained.mean()

@@ -120,24 +120,29 @@ def differ(one: str, other: str, si: str) -> bool:
 
 
 def taken_unit(
-    info: ChannelInfo, stated: str, ending: tuple[str, ...], known: Statistics | None
+    info: ChannelInfo,
+    stated: str,
+    ending: tuple[str, ...],
+    known: Statistics | None,
+    by: str = "name",
 ) -> TakenUnit:
     """The unit in which a column is taken for a channel.
 
     stated : the header's, plain;  ending : units that the column's name ends in
     known : what its numbers say; None where nobody looked at them
+    by : what takes it for that channel, in a word
     """
     fits = bool(stated) and _factor(stated, info.unit) is not None
     if fits:
-        header, said = stated, "name and unit"
+        header, said = stated, f"{by} and unit"
     else:
         usable = [unit for unit in ending if _factor(unit, info.unit) is not None]
         header = usable[0] if usable and not stated else ""
-        said = "name with its unit" if header else "name only"
+        said = "name with its unit" if header else f"{by} only"
     size = size_of(info.name)
     number = None if known is None or size is None else float(getattr(known, size.measure))
     if known is None or size is None or number is None or not number > 0.0:
-        return _untested(info, stated, header, said, fits)
+        return _untested(info, stated, header, said, fits, by)
     shown = _shown(known, size.measure)
     likely = _likely_units(info, size, number)
     if header:
@@ -151,9 +156,9 @@ def taken_unit(
     if stated:
         measures = measured_by(stated)
         said = (
-            f"name, but its unit {stated} measures {MEASURES[measures]}"
+            f"{by}, but its unit {stated} measures {MEASURES[measures]}"
             if measures
-            else f"name; the unit {stated} is not known"
+            else f"{by}; the unit {stated} is not known"
         )
     belief = 0.35 if stated and measured_by(stated) else 0.85
     if not likely:
@@ -178,12 +183,14 @@ def reads_gravity(known: Statistics, unit: str) -> bool:
     return UPRIGHT.least <= known.level * _scale(unit, "m/s^2") <= UPRIGHT.most
 
 
-def _untested(info: ChannelInfo, stated: str, header: str, said: str, fits: bool) -> TakenUnit:
+def _untested(
+    info: ChannelInfo, stated: str, header: str, said: str, fits: bool, by: str
+) -> TakenUnit:
     """The unit of a column whose numbers say nothing of it."""
     if header:
         return TakenUnit(header, 1.0 if fits else 0.97, said)
     if stated and measured_by(stated):
-        said = f"name, but its unit {stated} measures {MEASURES[measured_by(stated)]}"
+        said = f"{by}, but its unit {stated} measures {MEASURES[measured_by(stated)]}"
         return TakenUnit(info.unit, 0.35, said, doubted=True)
     return TakenUnit(info.unit, 0.7, f"{said}; no unit is stated", doubted=True)
 

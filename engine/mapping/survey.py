@@ -8,7 +8,7 @@ from ..formats.kinds import CSV
 from ..formats.table import Column, Table
 from .guess import Guess, guess, named_like_channels, with_template
 from .mapping import ChannelMapping, Places, told_apart
-from .numbers import Statistics, statistics
+from .numbers import Statistics, statistics, unreadable
 
 MOST_SURVEYED = 25_000_000
 """Numbers of a file up to which every column is looked at, not only those that may be channels."""
@@ -54,18 +54,20 @@ def survey(table: Table) -> Survey:
     if sum(one.samples for one in columns) > MOST_SURVEYED:
         wanted = sorted({*named_like_channels(columns), *clocks})
     known: dict[int, Statistics] = {}
+    unread: dict[int, Statistics] = {}
     bad: list[str] = []
     for index in wanted:
         try:
             known[index] = statistics(table.values(index))
         except MeasurementError as error:
+            unread[index] = unreadable(columns[index].samples)
             bad.append(str(error).removeprefix(f"{table.source}: "))
-    if len(wanted) == len(columns) and all(one.samples == one.missing for one in known.values()):
+    if len(wanted) == len(columns) and all(one.empty for one in known.values()):
         why = f" ({bad[0].rstrip('.').split('; ')[0]})" if bad else ""
         raise MeasurementError(
             f"{table.source}: no table of numbers was found{why}; export the recording with the"
             " columns' names on one line and a row of numbers a sample."
         )
-    found = guess(columns, known, clocks_told=table.kind != CSV)
+    found = guess(columns, known | unread, clocks_told=table.kind != CSV)
     doubts = tuple(dict.fromkeys((*table.warnings, *bad)))
     return Survey(table.source, table.kind, told_apart(columns), known, found, doubts)

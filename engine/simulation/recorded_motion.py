@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PPoly
 
-from ..channels import INPUT_CHANNELS, WHEEL_CHANNELS
+from ..channels import INPUT_CHANNELS, WHEEL_CHANNELS, conditioned_first
 from ..errors import MeasurementError
 from ..filters import PAD_PERIODS, is_uniform, resolved, smoothed, too_coarse
 from ..known_band import lowest_known, output_highpass
@@ -133,7 +133,7 @@ def _require(run: Run, settings: RimsSettings) -> None:
     if missing:
         raise MeasurementError(
             f"Run {run.name} lacks {', '.join(missing)}; the rims mode needs "
-            "time, the four wheel.*.z and chassis.a_x."
+            f"time, the four wheel.*.z and chassis.a_x{conditioned_first(run.columns)}."
         )
     for name in (*INPUT_CHANNELS, "chassis.v_x"):
         if name in run and not np.all(np.isfinite(run[name])):

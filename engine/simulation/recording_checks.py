@@ -24,6 +24,7 @@ from ..spikes import spikes
 from ..vehicle import Vehicle
 from ..wheel_plane import plane_on_wheels
 from .wheel_order import exchanged_wheels
+from .wheel_unit import wheels_too_small
 
 REST_WINDOW = 0.5
 """The start of a record looked at for rest, s."""
@@ -91,6 +92,7 @@ def check_recording(run: Run) -> list[Finding]:
         ),
         *_acceleration_against_speed(run),
         *(Finding(sentence, True) for sentence in _one_wheel_turned_over(run)),
+        *(Finding(sentence, True) for sentence in wheels_too_small(run)),
     ]
 
 

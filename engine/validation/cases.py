@@ -15,7 +15,6 @@ from ..identification.sensor_model import readings_in
 from ..manoeuvre import Manoeuvre
 from ..measurement import missing_for_identification
 from ..run import Run
-from ..vehicle import Vehicle
 
 Role = Literal["fit", "hold-out"]
 
@@ -38,16 +37,6 @@ def as_it_moved(run: Run, fit: Mapping[str, Any], fitted: str | None) -> Run:
     """
     noise = {**run.noise, **noise_in(fit, fitted, run.time)}
     return corrected(replace(run, noise=noise), readings_in(fit, fitted))
-
-
-def another_car(run: Run, vehicle: Vehicle) -> list[str]:
-    """A sentence where a run is known to be of another car than the one that predicts it."""
-    if run.vehicle in ("", vehicle.name):
-        return []
-    return [
-        f"Run {run.name} was recorded with another car, {run.vehicle}, than the one that predicts"
-        f" it, {vehicle.name}; leave it out unless they are the same."
-    ]
 
 
 def check_cases(cases: Sequence[Case]) -> list[str]:

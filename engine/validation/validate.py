@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import Cancelled
+from ..identification.compared_runs import another_car
 from ..identification.kept_fit import KeptFit
 from ..manoeuvre import Manoeuvre
 from ..roads.road_spectrum import RoadSpectrum, road_spectra
@@ -18,7 +19,7 @@ from ..run import Run
 from ..simulation.rims_settings import RimsSettings
 from ..simulation.simulate import Traction
 from ..vehicle import Vehicle
-from .cases import Case, Role, another_car, check_cases
+from .cases import Case, Role, check_cases
 from .prediction import Driver, Prediction, as_compared, kinds, predict
 from .squat import SquatWindow, squat_window
 

@@ -44,6 +44,13 @@ def test_advice_after_a_fit_takes_its_values_and_what_was_free(folder, capsys):
     assert told["candidates"][0]["sentence"].count("phi_F from") == 1
 
 
+def test_a_fit_without_its_runs_is_told_to_need_them(folder, capsys):
+    fit = f"identify {TWIN[0]} --vehicle paper --free K_F K_R -o fit.json"
+    assert main(fit.split()) == 0
+    assert main(["advise", "--vehicle", "fit.json", "--candidates", "brake-54"]) == 0
+    assert "What fit.json knows counts only together with its runs" in capsys.readouterr().out
+
+
 def test_from_a_vehicle_the_runs_are_fitted_first(folder, capsys):
     assert main(f"advise {TWIN[1]} --vehicle paper --candidates brake-54".split()) == 0
     assert capsys.readouterr().out.startswith("The fit converged")

@@ -137,7 +137,8 @@ def test_the_detailed_car_drives_and_leaves_what_is_known_of_it(folder, capsys):
 def test_the_detailed_car_without_its_package_says_what_to_install(folder, capsys, monkeypatch):
     monkeypatch.setattr("ridetune.engine.detailed.exudyn_module.find_spec", lambda name: None)
     message = refused(capsys, "campaign", "--plant", "detailed", "-o", "runs")
-    assert message.endswith(f"not installed; {how_to_install('detailed')}.")
+    how = how_to_install("detailed")
+    assert message.endswith(f"not installed; {how}, and start a running service again.")
     assert not list(folder.iterdir())
 
 

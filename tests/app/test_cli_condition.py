@@ -52,6 +52,23 @@ def test_the_suggested_steps_can_be_edited_and_done(folder, capsys):
     assert read_run("done.csv").conditioning == done.conditioning
 
 
+def test_without_a_place_it_says_that_nothing_was_written(folder, capsys):
+    before = sorted(folder.iterdir())
+    (folder / "steps.json").write_text('[{"kind": "rest"}]')
+    assert main(["condition", "raw.csv", "--steps", "steps.json"]) == 0
+    assert "Nothing was written; add -o run.csv" in capsys.readouterr().out
+    assert sorted(folder.iterdir()) == sorted([*before, folder / "steps.json"])
+
+
+def test_a_fit_to_raw_sensors_is_led_to_conditioning(folder, capsys):
+    assert main(["identify", "raw.csv", "--vehicle", "car.json"]) == 2
+    said = capsys.readouterr().err
+    assert "has none of chassis.z, chassis.pitch, chassis.roll" in said
+    assert (
+        "make them of raw sensors such as chassis.pitch_rate first, with ridetune condition" in said
+    )
+
+
 @pytest.mark.parametrize(("low", "told"), [(0.45, "0.9"), (None, None)])
 def test_the_high_pass_that_the_steps_call_for_is_told(folder, capsys, low, told):
     """Oracle: twice the lowest frequency of what is made; nothing without a band."""

@@ -181,6 +181,45 @@ def test_a_channel_with_the_wrong_sign_ends_in_a_warning_that_names_it(folder, d
     assert any("chassis.z" in line for line in warnings)
 
 
+def test_a_run_of_another_car_is_warned_of(folder, driven, capsys):
+    """Oracle: the car that the notes name, and the one that is fitted."""
+    write_run(read_run(driven), "lap.csv")
+    command = ["identify", "lap.csv", "--vehicle", "paper", "--free", "K_F"]
+    car = reference_vehicles()["paper"].name
+    said_of_it = "lap.csv was recorded with another car, BMW 320i"
+    for named, said in ((car, []), ("BMW 320i", [said_of_it])):
+        (folder / "lap.toml").write_text(f'vehicle = "{named}"')
+        assert main(command) == 0
+        printed = capsys.readouterr().out.splitlines()
+        warnings = [line for line in printed if "another car" in line]
+        assert len(warnings) == len(said)
+        for sentence, warning in zip(said, warnings, strict=True):
+            assert sentence in warning
+            assert f"than the one that follows it, {car}" in warning
+
+
+def test_a_fit_that_ended_at_a_bound_is_gone_on_with_between_its_bounds(folder, driven):
+    """Oracle: the bounds of the first fit, below the car's stiffness; those typed go before."""
+    command = ["identify", str(driven), "--free", "K_F", "K_R", "-o"]
+    front = "front.suspension.stiffness"
+    at = ["--bounds", "K_F=10000:20000", "--start", "K_F=15000"]
+    assert main([*command, "fit.json", "--vehicle", "paper", *at]) == 0
+
+    def bounds_of(*options):
+        assert main([*command, "again.json", "--vehicle", "fit.json", *options]) == 0
+        rows = json.loads((folder / "again.json").read_text())["parameters"]
+        return {row["name"]: (row["lower"], row["upper"]) for row in rows}
+
+    first = json.loads((folder / "fit.json").read_text())
+    assert [row["at_bound"] for row in first["parameters"]] == [True, False]
+    again = bounds_of()
+    assert again[front] == (10000.0, 20000.0)
+    start = first["parameters"][1]["value"]
+    assert again["rear.suspension.stiffness"] == pytest.approx((0.05 * start, 8.0 * start))
+    assert bounds_of("--bounds", "K_F=10000:50000")[front] == (10000.0, 50000.0)
+    assert bounds_of("--start", "K_F=20000")[front] == pytest.approx((1000.0, 160000.0))
+
+
 def test_a_turned_sensor_is_offered_as_an_option_that_mends_the_fit(folder, driven, capsys):
     """Oracle: the fit to the recording that is not turned, and its prediction by rims."""
     run = read_run(driven)

@@ -16,3 +16,11 @@ def test_a_file_of_another_kind_is_told_where_it_goes(tmp_path, find, name, said
     (tmp_path / name).write_text("time [s]\n0\n")
     with pytest.raises(RideError, match=said):
         find(str(tmp_path / name))
+
+
+def test_a_name_that_is_no_slip_in_writing_lists_what_there_is():
+    """Oracle: "fast" shares three letters with "coast", and is no manoeuvre."""
+    with pytest.raises(RideError, match="nor a manoeuvre of that name; known are .*coast"):
+        find_manoeuvre("fast")
+    with pytest.raises(RideError, match="did you mean coast?"):
+        find_manoeuvre("cosat")

@@ -9,7 +9,8 @@ from ridetune.app.recordings import as_stated, stated
 from ridetune.engine.formats.child import ChildTable
 from ridetune.engine.mapping.mapping import read_mapping
 from ridetune.engine.mapping.reading import read_recording
-from ridetune.engine.measurement import read_run
+from ridetune.engine.measurement import read_run, run_to_csv
+from ridetune.engine.run import Run
 
 from .conftest import SAMPLES, short_recording
 from .test_cli_channels import TITLES
@@ -116,6 +117,20 @@ def test_columns_come_with_numbers_guess_reasons_and_candidates(visitor, kept):
     json.dumps(found, allow_nan=False)
 
 
+def test_a_column_is_asked_for_as_any_channel(visitor, kept):
+    """The pitch's numbers reach 3: as a height they are mm, whatever its header says."""
+    path = f"/measurements/{kept['id']}/columns"
+    [pitch] = [one for one in visitor.get(path).json()["columns"] if one["name"] == "Nickwinkel"]
+    asked = {"index": pitch["index"], "channel": "wheel.fl.z"}
+    found = visitor.get(f"{path}/candidate", params=asked).json()
+    assert (found["channel"], found["unit"], found["doubted"]) == ("wheel.fl.z", "mm", True)
+    reply = visitor.get(f"{path}/candidate", params=asked | {"channel": "wheel.z"})
+    assert reply.status_code == 422
+    assert "wheel.z" in reply.json()["detail"]
+    reply = visitor.get(f"{path}/candidate", params=asked | {"index": 9})
+    assert "There is no column 9" in reply.json()["detail"]
+
+
 def test_what_is_proposed_can_be_put_and_signs_are_offered(visitor, kept):
     path = f"/measurements/{kept['id']}"
     proposed = visitor.get(f"{path}/columns").json()["proposed"]
@@ -136,6 +151,24 @@ def test_what_is_proposed_can_be_put_and_signs_are_offered(visitor, kept):
     )
     sure = visitor.put(f"{path}/mapping", json=proposed).json()
     assert sure == found | {"mapping": proposed, "sign_suggestions": []}
+
+
+@pytest.mark.parametrize("turned", [(), ("chassis.pitch",)])
+def test_signs_of_a_file_with_our_names_are_looked_at_too(visitor, turned):
+    """Oracle: the sample as it is, and with its pitch turned over; Flip is a mapping then."""
+    run = read_run(NATIVE)
+    over = {name: (-1 if name in turned else 1) * run[name][::STEP] for name in run.columns}
+    sent = run_to_csv(Run("lap", run.time[::STEP], over)).encode()
+    found = visitor.upload(sent, "lap.csv").json()
+    assert (found["needs_mapping"], found["mapping"]) == (False, None)
+    assert [one["channel"] for one in found["sign_suggestions"]] == [*turned]
+    path = f"/measurements/{found['id']}"
+    mapping = visitor.get(f"{path}/columns").json()["proposed"]
+    for one in mapping["columns"]:
+        one["sign"] = -1 if one["channel"] in turned else 1
+    assert visitor.put(f"{path}/mapping", json=mapping).json()["sign_suggestions"] == []
+    assert visitor.delete(f"{path}/mapping").status_code == 200
+    assert visitor.get(path).json()["sign_suggestions"] == found["sign_suggestions"]
 
 
 def test_a_mapping_and_its_run_are_saved_for_the_command_line(visitor, kept, tmp_path, capsys):

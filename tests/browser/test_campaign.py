@@ -193,7 +193,7 @@ def test_a_car_that_cannot_drive_here_is_shown_with_the_reason(visit, service):
     """As the service's list has it where the solver is not installed."""
     visitor = visit()
     how = how_to_install("detailed")
-    why = f"The detailed car is solved by Exudyn, which is not installed; {how}."
+    why = f"The detailed car needs Exudyn; {how}, and start a running service again."
 
     def lacking(route):
         concept, detailed = route.fetch().json()

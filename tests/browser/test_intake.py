@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ridetune.engine.measurement import read_run, run_to_csv
+from ridetune.engine.run import Run
 
 from ..factories import paper_vehicle
 from ..files_of_kinds import mdf, parquet, tdms
@@ -149,6 +150,55 @@ def test_a_foreign_csv_is_mapped_corrected_flipped_and_its_mapping_kept(visitor)
     assert "not applied" in said(visitor)
     page.keyboard.press("Escape")
     assert not visitor.element("#intake").is_visible()
+    visitor.settled()
+
+
+def test_a_column_without_a_unit_takes_it_from_its_numbers_when_chosen_by_hand(visitor):
+    """Oracle: the wheel's heights, which the file holds in m; in mm it would hardly move."""
+    page = visitor.page
+    visitor.click("#tab-measurements")
+    run = read_run(NATIVE)
+    in_m = foreign().decode().replace("Radweg VL [m]", "Kanal 7")
+    head, *lines = in_m.split("\n")
+    place = head.split(";").index("Kanal 7")
+    rows = [line.split(";") for line in lines]
+    for row, value in zip(rows, run["wheel.fl.z"][::10], strict=True):
+        row[place] = f"{value:.9f}".replace(".", ",")
+    add(visitor, "kanal.csv", "\n".join([head, *map(";".join, rows)]).encode())
+    open_next(visitor, ".mapping-table")
+    page.get_by_label("Channel of Kanal 7").focus()
+    page.get_by_label("Channel of Kanal 7").select_option("wheel.fl.z")
+    row = page.locator(".mapping-table tr", has_text="Kanal 7")
+    visitor.wait(lambda: "unit guessed" in row.inner_text(), "the service has told the unit")
+    assert page.get_by_label("Unit of Kanal 7").input_value() == "m"
+    assert "by hand" in row.inner_text()
+    # In the wrong one its doubt is in sight, not folded away.
+    page.get_by_label("Unit of Kanal 7").fill("mm")
+    page.get_by_label("Unit of Kanal 7").press("Tab")
+    visitor.click("#apply-mapping")
+    doubt = page.locator(".mapping-head .warnings li", has_text="wheel.fl.z stays within")
+    visitor.wait(doubt.is_visible, "the doubt is told")
+    assert "is it in m?" in doubt.inner_text()
+    visitor.settled()
+
+
+def test_the_signs_of_a_file_with_our_names_are_looked_at_when_it_is_added(visitor):
+    """Oracle: the sample with its pitch turned over, and what it is turned back to."""
+    page, run = visitor.page, read_run(NATIVE)
+    over = {name: (-1 if name == "chassis.pitch" else 1) * run[name][::10] for name in run.columns}
+    visitor.click("#tab-measurements")
+    add(visitor, "lap.csv", run_to_csv(Run("lap", run.time[::10], over)).encode())
+    told = page.locator(".notice", has_text="lap.csv is in")
+    assert "1 sign may be turned over" in told.inner_text()
+    assert "check 1 sign" in visitor.element(".pick").inner_text()
+    told.get_by_role("button", name="Check signs").click()
+    flip = page.get_by_role("button", name="Flip chassis.pitch")
+    visitor.wait(flip.is_visible, "the sign is offered")
+    flip.click()
+    visitor.until("ridetune.state('measurements').at(-1).sign_suggestions.length === 0")
+    found = {one["name"]: one["maximum"] for one in newest(visitor)["channels"]}
+    expected = run["chassis.pitch"][::10].max()
+    assert found["chassis.pitch"] == pytest.approx(expected, rel=1e-9)
     visitor.settled()
 
 

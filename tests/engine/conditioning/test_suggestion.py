@@ -92,6 +92,12 @@ def test_hub_accelerometers_do_without_a_vehicle(raw):
     assert missing_for_identification(condition(raw, found.steps)) == ()
 
 
+def test_one_accelerometer_gives_and_several_give(raw):
+    told = suggest(only(raw, "body_a_", "_rate", "v_x", "wheel.")).reasons
+    assert "displacement: chassis.a_z gives chassis.z in a band." in told
+    assert any("wheel.rl.a_z and wheel.rr.a_z give wheel.fl.z, " in one for one in told)
+
+
 def test_what_no_step_makes_is_named_with_its_remedy(raw):
     found = suggest(only(raw, "travel"))
     assert found.lacks[0].startswith("wheel.fl.z: give a vehicle, with which suspension.fl.travel")

@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from ridetune.engine.channels import CHANNELS, channel
 from ridetune.engine.formats.csv_file import CsvFile
 from ridetune.engine.formats.table import Column, HeldTable
 from ridetune.engine.mapping.apply import apply
-from ridetune.engine.mapping.guess import THRESHOLD, guess
+from ridetune.engine.mapping.guess import THRESHOLD, chosen_by_hand, guess
 from ridetune.engine.mapping.mapping import ChannelMapping, MappedColumn
 from ridetune.engine.mapping.survey import survey
 
@@ -173,6 +173,7 @@ def test_words_of_a_channel_are_found_however_they_are_written(data):
 
 @settings(max_examples=200, deadline=None)
 @given(st.lists(st.tuples(st.text(max_size=60), st.text(max_size=12)), min_size=1, max_size=6))
+@example([("uV0gB", ""), ("uV0gB", "")])
 def test_any_header_is_taken_without_failing_and_no_channel_twice(header):
     found = guess([Column(name, unit, 100) for name, unit in header], {})
     channels = [one.channel for one in found.mapping.columns]
@@ -296,6 +297,27 @@ def test_without_a_unit_the_numbers_decide(stated):
         assert one.unit == unit
         assert one.reason.startswith("name only; values to")
         assert one.confidence < 0.9
+
+
+@pytest.mark.parametrize(("size", "unit"), [(30.0, "mm"), (0.009, "m")])
+def test_a_column_chosen_by_hand_takes_its_unit_from_its_numbers(size, unit):
+    """Its name tells nothing of a wheel; the wheel's size is that of the rule for a guess."""
+    time = np.arange(0.0, 5.0, 0.01)
+    found = survey(held({"Time": ("s", time), "whl_z(1)": ("", size * np.sin(time))}))
+    one = chosen_by_hand(found.columns[1], found.known[1], "wheel.fl.z")
+    assert (one.channel, one.unit, one.sign, one.doubted) == ("wheel.fl.z", unit, 1, True)
+    assert one.reason == f"choice only; values to {size:.4g} fit {unit}"
+
+
+@pytest.mark.parametrize(
+    ("name", "stated", "unit", "doubted"),
+    [("c1", "mm", "mm", False), ("wheel_mm", "", "mm", False), ("c1", "m", "mm", True)],
+)
+def test_a_column_chosen_by_hand_keeps_the_unit_that_its_numbers_fit(name, stated, unit, doubted):
+    time = np.arange(0.0, 5.0, 0.01)
+    found = survey(held({"Time": ("s", time), name: (stated, 30.0 * np.sin(time))}))
+    one = chosen_by_hand(found.columns[1], found.known[1], "wheel.fl.z")
+    assert (one.unit, one.doubted) == (unit, doubted)
 
 
 def test_a_unit_of_another_quantity_is_not_followed():

@@ -1,5 +1,6 @@
 """Files of other names from disk. Oracle: the numbers that were written."""
 
+import re
 from datetime import UTC, datetime
 
 import numpy as np
@@ -36,6 +37,18 @@ def test_a_text_is_surveyed_column_by_column(text):
     assert any("column Bemerkung: 'start' is not a number" in one for one in found.warnings)
     chosen = {one.column: (one.channel, one.unit) for one in found.guess.mapping.columns}
     assert chosen == {"Zeit": ("time", "s"), "Aufbauhub": ("chassis.z", "mm")}
+
+
+def test_a_column_without_numbers_is_taken_for_no_channel(text):
+    """Its name alone says what it is: words below it, and nothing."""
+    for cell in ("fast", ""):
+        lines = text.read_text().splitlines()
+        lines[0] = lines[0].replace("Bemerkung", "Geschwindigkeit [m/s]")
+        lines[1:] = [re.sub(r"(,start|,x),", f",{cell},", line) for line in lines[1:]]
+        text.with_name("words.csv").write_text("\n".join(lines))
+        found = survey_file(text.with_name("words.csv"))
+        assert "chassis.v_x" not in [one.channel for one in found.guess.mapping.columns]
+        assert found.guess.candidates[2] == ()
 
 
 def test_a_text_is_read_with_its_notes_and_its_gap_bridged(text):

@@ -1,6 +1,9 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
-from ridetune.engine.channels import INPUT_CHANNELS
+from ridetune.engine.channels import INPUT_CHANNELS, WHEEL_CHANNELS
+from ridetune.engine.measurement import read_run
 from ridetune.engine.run import Run
 from ridetune.engine.simulation.recording_checks import check_on_car, check_recording, stands
 from ridetune.engine.simulation.wheel_order import wheel_rises
@@ -8,6 +11,7 @@ from ridetune.engine.simulation.wheel_order import wheel_rises
 from ...factories import paper_vehicle
 
 CAR = paper_vehicle()
+SAMPLES = Path(__file__).parents[3] / "sample_runs"
 
 TIME = np.arange(0.0, 10.0, 0.005)
 PULL_AWAY = np.where((TIME > 2.0) & (TIME < 6.0), 2.0, 0.0)
@@ -143,3 +147,34 @@ def test_a_rig_that_rolls_the_car_turns_no_wheel_over():
     road = 0.02 * np.sin(2.0 * TIME)
     left = {"wheel.fl.z": road, "wheel.rl.z": road}
     assert findings(run(**left, **{"wheel.fr.z": -road, "wheel.rr.z": -road})) == []
+
+
+@pytest.mark.parametrize("path", sorted(SAMPLES.glob("**/*.csv")), ids=lambda path: path.stem)
+def test_wheels_a_thousand_times_too_small_are_a_fault_of_every_shipped_recording(path):
+    """Oracle: the recordings as they are, on rough roads, over a bump and braking, and with mm for
+    the wheels' m.
+    """
+    shipped = read_run(path)
+    assert not [one for one in check_recording(shipped) if one.fault]
+    channels = {name: shipped[name] for name in shipped.columns}
+    channels |= {name: 1e-3 * shipped[name] for name in WHEEL_CHANNELS}
+    [finding] = check_recording(run(shipped.time, **channels))
+    assert finding.fault
+    assert "go with the wheels" in finding.sentence
+    assert "unit of the wheel.*.z is probably wrong" in finding.sentence
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-4])
+def test_a_car_that_dives_on_a_flat_road_has_no_mistaken_unit(noise):
+    """The body moves by hundreds of times what the wheels' sensors are noisy by."""
+    rng = np.random.default_rng(4)
+    dive = np.convolve(np.where((TIME > 3.0) & (TIME < 7.0), -8.0, 0.0), np.ones(40) / 40, "same")
+    wheels = {name: noise * rng.standard_normal(TIME.size) for name in WHEEL_CHANNELS}
+    body = {"chassis.z": 0.003 * dive, "chassis.pitch": -0.005 * dive}
+    assert findings(run(**wheels, **body, **{"chassis.a_x": dive})) == []
+
+
+def test_a_rig_moves_wheels_as_much_as_the_body():
+    post = 0.02 * np.sin(2.0 * TIME)
+    wheels = dict.fromkeys(WHEEL_CHANNELS, post)
+    assert findings(run(**wheels, **{"chassis.z": 3.0 * post})) == []
