@@ -340,7 +340,8 @@ def test_the_plants_are_listed(client):
 def test_a_car_whose_solver_is_not_installed_is_listed_and_refused(visitor, monkeypatch):
     monkeypatch.setattr("ridetune.engine.detailed.exudyn_module.find_spec", lambda name: None)
     _, detailed = visitor.client.get("/api/plants").json()
-    assert detailed["missing"].endswith(f"not installed; {how_to_install('detailed')}.")
+    remedy = f"{how_to_install('detailed')}, and start a running service again."
+    assert detailed["missing"].endswith(f"not installed; {remedy}")
     refused = visitor.post("/campaigns", json={"plant": "detailed", "manoeuvres": ["bump"]})
     assert (refused.status_code, refused.json()["detail"]) == (422, detailed["missing"])
     assert visitor.get("/campaigns").json() == []
