@@ -3,7 +3,7 @@
 
 import * as api from "./api.js";
 import { $, breakable, h, inPlace } from "./dom.js";
-import { RECORDINGS, kindOfJson, requireNotes } from "./file_kinds.js";
+import { Misplaced, RECORDINGS, kindOfJson, requireNotes } from "./file_kinds.js";
 import * as intake from "./intake.js";
 import { dataOf, lacks, nameOf, original } from "./names.js";
 import { sentence } from "./noise.js";
@@ -77,13 +77,19 @@ async function sort(files) {
       if (kind === "vehicle") hooks.takeVehicle(file);
       else await keepMapping(file, data);
     } catch (error) {
-      if (error.lost) set({ online: false });
-      refusals.push({ name: file.name, error });
+      refuse(refusals, file, error);
     }
   }
   if (!ours.length && !refusals.length) return;
   hooks.open();
   add(ours, refusals);
+}
+
+/** Note why a file was not taken; what went wrong in the page itself is no reason of the file's. */
+function refuse(refusals, { name }, error) {
+  if (error.lost) set({ online: false });
+  if (error instanceof api.Refusal || error instanceof Misplaced) refusals.push({ name, error });
+  else reportError(error);
 }
 
 /** A mapping file becomes a template. */
@@ -102,8 +108,7 @@ async function add(files, refusals) {
     try {
       await (beside(file) ? attach(file, beside(file)) : take(file));
     } catch (error) {
-      failures.push({ name: file.name, error });
-      if (error.lost) set({ online: false });
+      refuse(failures, file, error);
     }
   }
   parts.busy = null;
@@ -164,7 +169,7 @@ async function attach(file, { end, attach: send, told, say }) {
   const stem = file.name.replace(end, "");
   const row = get("measurements").findLast(({ name }) => name.replace(/\.\w+$/, "") === stem);
   if (!row) {
-    throw new Error(`No recording here is called ${stem}.csv, whose ${told} it could ` +
+    throw new Misplaced(`No recording here is called ${stem}.csv, whose ${told} it could ` +
       "state; add the recording first, or with it.");
   }
   const noted = await send(row.id, file);
