@@ -89,6 +89,7 @@ class Recordings:
             conditioning=done,
             noise=measurement.noise,
             vehicle=measurement.summary.get("vehicle") or run.vehicle,
+            plant=measurement.summary.get("plant") or run.plant,
             warnings=(*run.warnings, *doubtful_noise(measurement.noise, run.channels)),
         )
 
@@ -164,7 +165,7 @@ class Recordings:
         """
         with self.table(measurement) as table:
             found, noise = _by_names(table, measurement.noise)
-        return {**found, "vehicle": measurement.summary.get("vehicle") or found["vehicle"]}, noise
+        return {**found, **named_car(measurement.summary, found)}, noise
 
     def summed_up(self, measurement: Measurement) -> dict[str, Any]:
         """Summary of a measurement as it is used."""
@@ -218,6 +219,11 @@ def _by_names(
     except UnmappedError as error:
         return _unmapped_summary(table, error), dict(noise)
     return summary(run), dict(run.noise)
+
+
+def named_car(first: Mapping[str, Any], then: Mapping[str, Any]) -> dict[str, str | None]:
+    """The car that drove, and which virtual one: as one summary names it, else as another."""
+    return {name: first.get(name) or then.get(name) for name in ("vehicle", "plant")}
 
 
 def _size(run: Run) -> int:
@@ -309,6 +315,7 @@ def summary(
         "sign_suggestions": [asdict(one) for one in check_signs(run, sure)],
         "data_sha256": _digest(raw or run),
         "vehicle": run.vehicle or None,
+        "plant": run.plant or None,
     }
 
 
@@ -334,6 +341,7 @@ def _unmapped_summary(table: "Table", reason: MeasurementError) -> dict[str, Any
         "missing": list(missing_for_identification(Run(found.source, nothing, guessed))),
         "sign_suggestions": [],
         "vehicle": None,
+        "plant": None,
     }
 
 
