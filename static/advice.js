@@ -76,6 +76,7 @@ function list() {
   const shown = all ? advice.candidates : advice.candidates.slice(0, FIRST);
   const more = advice.candidates.length - shown.length;
   return [
+    advice.warnings.length ? h("ul", { className: "warnings" }, advice.warnings.map((text) => h("li", {}, text))) : null,
     h("ol", { className: "candidates" }, shown.map((one) => h("li", {},
       h("button", { type: "button", "aria-pressed": one.key === chosen, id: `candidate-${one.key}`,
         on: { click: () => { chosen = one.key; show(); } } },

@@ -34,11 +34,11 @@ export function build(callbacks) {
   });
   free.build();
   fit.build(() => { if (view === "fit") show(); });
-  on("measurements ride", () => {
+  on("measurements ride use", () => {
     const panel = $("#identification");
     if (view === "setup" && !panel.hidden && !panel.contains(document.activeElement)) show();
   });
-  on("measurements ride", saidOfRuns);
+  on("measurements ride use", saidOfRuns);
   on("vehicle", () => { if (view === "fit") show(); });
   on("values", () => { if (view === "setup" && !$("#identification").hidden) free.askBounds(); });
   show();

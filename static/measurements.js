@@ -2,10 +2,10 @@
 // driven; see how far each is on its way from file to run; look, delete.
 
 import * as api from "./api.js";
-import { $, breakable, h, inPlace } from "./dom.js";
+import { $, breakable, capital, h, inPlace } from "./dom.js";
 import { Misplaced, RECORDINGS, kindOfJson, requireNotes } from "./file_kinds.js";
 import * as intake from "./intake.js";
-import { dataOf, lacks, nameOf, original } from "./names.js";
+import { dataOf, drivenBy, lacks, nameOf, original } from "./names.js";
 import { sentence } from "./noise.js";
 import { notice } from "./notices.js";
 import { AXIS, COLOURS, fitWidth } from "./plots.js";
@@ -303,6 +303,7 @@ function detail(row) {
       : h("p", { className: "hint" }, stageTold(row, stage)),
     ...(names.length ? [h("div", { className: "row-tools" }, choice, facts), drawing] : []),
     h("p", { className: "hint" }, sentence(row)),
+    row.plant ? h("p", { className: "hint" }, capital(`${drivenBy(row)}.`)) : null,
     h("p", { className: "hint" }, driven(row), row.manoeuvre
       ? [" ", h("button", { type: "button", title: "It was another road, or another drive",
         on: { click: () => forget(row) } }, "Forget")] : null),

@@ -115,6 +115,13 @@ def test_a_fit_tells_what_its_run_determines_and_what_to_drive_next(analyst):
     assert chosen.count() == 1
     assert chosen.get_attribute("value") == best["key"]
     assert f"1 drive, {best['duration']:g} s" in visitor.element("#campaign-state").inner_text()
+    # What was advised of the fitted car is driven by it, though the sliders hold the start values.
+    assert "The fitted car, " in visitor.element("#campaign-driver").inner_text()
+    visitor.click("#drive")
+    visitor.until("ridetune.state('measurements').length === 4", 120)
+    assert visitor.look("ridetune.campaign().vehicle") == fit["vehicle"]
+    stiffness = "front.suspension.stiffness"
+    assert visitor.value(stiffness) != fit["vehicle"]["front"]["suspension"]["stiffness"]
 
 
 def test_the_error_band_of_an_applied_fit_holds_its_curve_and_follows_no_other(analyst):
