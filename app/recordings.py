@@ -25,7 +25,7 @@ from ..engine.run import Run
 from ..engine.run_notes import doubtful_noise
 from ..engine.simulation.rims_settings import RimsSettings
 from ..engine.step_record import step_records_from_json
-from .errors import NotFound
+from .errors import Deleted, NotFound
 from .store import Measurement, NewMeasurement, Store
 
 if TYPE_CHECKING:
@@ -272,8 +272,18 @@ def stated(measurement: Measurement) -> dict[str, Any]:
     }
 
 
-def as_stated(measurement: Measurement, kept: Mapping[str, Any]) -> Measurement:
-    """The measurement as it was when a job kept that of it."""
+def as_stated(
+    store: Store,
+    session: str,
+    kept: Mapping[str, Any],
+    role: str = "which this is about",
+    remedy: str = "ask anew",
+) -> Measurement:
+    """A measurement as it was when a job kept that of it; Deleted names it by its role."""
+    try:
+        measurement = store.measurement(session, kept["id"])
+    except NotFound:
+        raise Deleted(f"{kept['name']}, {role}, was deleted; add it again and {remedy}.") from None
     # Jobs of an earlier service say nothing of these, and its sweeps nothing of noise.
     return replace(
         measurement,

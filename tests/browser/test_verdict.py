@@ -123,6 +123,21 @@ def test_a_fit_tells_what_its_run_determines_and_what_to_drive_next(analyst):
     stiffness = "front.suspension.stiffness"
     assert visitor.value(stiffness) != fit["vehicle"]["front"]["suspension"]["stiffness"]
 
+    # What the fit was made of is deleted: a further question names it, and is of no use again.
+    page.locator(".pick button", has_text="twin.csv").click()
+    visitor.element(".measurement-detail .danger").click()
+    visitor.element(".measurement-detail .danger").click()
+    visitor.until("ridetune.state('measurements').length === 3")
+    visitor.settled()
+    visitor.expect("410")
+    visitor.click("#tab-identification")
+    page.locator("#fit-parameters").click()
+    page.get_by_label("Profile of Rear spring stiffness").click()
+    problem = visitor.element("#identification .problem")
+    visitor.wait(lambda: problem.count() == 1, "a sentence")
+    assert problem.inner_text().startswith("twin.csv, to which this car was fitted, was deleted")
+    assert page.get_by_role("button", name="Try again").count() == 0
+
 
 def test_the_error_band_of_an_applied_fit_holds_its_curve_and_follows_no_other(analyst):
     """Truth: a symmetrical band holds the curve about which it is taken."""
