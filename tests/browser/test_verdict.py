@@ -154,6 +154,15 @@ def test_the_error_band_of_an_applied_fit_holds_its_curve_and_follows_no_other(a
     visitor.click("#tab-comfort")
     assert "±" in visitor.element(".metrics:not(.fits) tbody").inner_text()
 
+    # However long it takes, it stays wanted; until it is there again it says that it follows.
+    visitor.element("#slider-rear-suspension-stiffness").press("PageUp")
+    assert visitor.look("ridetune.state('bands')") is None
+    assert page.get_by_label("Error band").is_checked()
+    assert visitor.element("#band-word").inner_text() == "follows …"
+    visitor.until("ridetune.state('bands') !== null")
+    assert page.get_by_label("Error band").is_checked()
+    assert visitor.element("#band-word").inner_text() == ""
+
     # A slider that moves takes the band away at once; wanted, it comes again when the slider rests.
     page.get_by_label("Error band").uncheck()
     assert visitor.look("ridetune.state('bands')") is None
