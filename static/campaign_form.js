@@ -69,9 +69,9 @@ function cars() {
       return [{ key, plant, label: name, missing: why, vehicle: () => null, said: () => `The ${name.toLowerCase()} drives.` }];
     }
     const onSliders = () => withValues(get("vehicle"), get("values"));
-    const fitted = get("fit") && { key: `${key}-fitted`, plant, fitted: true, label: `${name}: fitted`, missing: why,
+    const fitted = get("fit") && { key: `${key}-fitted`, plant, fitted: true, label: "Fitted car", missing: why,
       vehicle: () => get("fit").vehicle, said: () => drivenBy("fitted car", get("fit").vehicle) };
-    return [{ key, plant, label: `${name}: sliders`, missing: why, vehicle: onSliders,
+    return [{ key, plant, label: "Sliders' car", missing: why, vehicle: onSliders,
       said: () => drivenBy("car on the sliders", get("vehicle")) }, fitted].filter(Boolean);
   });
 }
