@@ -18,19 +18,20 @@ let why = "";
 const parts = {};
 
 export function build() {
-  parts.box = h("input", { type: "checkbox", on: { change: () => {
+  parts.box = h("input", { type: "checkbox", "aria-label": "Error band", on: { change: () => {
     wanted = parts.box.checked;
     why = "";
     if (wanted) ask();
     else set({ bands: null });
     show();
   } } });
-  parts.word = h("span", { className: "hint", id: "band-word" });
+  parts.word = h("span", { className: "key band", id: "band-word" });
   parts.label = h("label", { className: "inline", id: "band-toggle", hidden: true }, parts.box,
-    h("span", { className: "key band" }, "Error band"), parts.word);
+    parts.word);
   $("#band-place").replaceWith(parts.label);
   on("now", follow);
   on("values ride road liftOff traction rimsSettings braking vehicle fitJob", drop);
+  on("fitJob", follow);
   on("fit vehicle values bands", show);
   show();
 }
@@ -88,7 +89,8 @@ function show() {
   const fit = get("fit");
   parts.label.hidden = !fit?.covariance || !isOfThisCar(fit);
   parts.box.checked = wanted;
-  parts.word.textContent = !wanted || !get("now") || get("bands") ? "" : why && !asking ? "not here" : "follows …";
-  parts.label.classList.toggle("waiting", asking);
+  const late = wanted && Boolean(get("now")) && !get("bands");
+  parts.word.textContent = !late ? "Error band" : why && !asking ? "none here" : "follows …";
+  parts.label.classList.toggle("waiting", late || asking);
   parts.label.title = why || "95 % of what the errors of the fit leave open in the prediction of the car on show";
 }
