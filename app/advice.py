@@ -14,9 +14,9 @@ from ..engine.manoeuvre import Manoeuvre, manoeuvre_from_json
 from ..engine.vehicle_file import vehicle_from_json
 from .errors import InvalidRequest, OverBudget
 from .excitation import known_manoeuvre
-from .identification_job import UNTOLD, build_problem, done, marked_runs
+from .identification_job import UNTOLD, build_problem, done, fitted_recordings, marked_runs
 from .job_store import Job
-from .recordings import Recordings, as_stated
+from .recordings import Recordings
 from .schemas import AdviceRequest
 from .settings import Limits
 from .store import Store
@@ -57,7 +57,7 @@ def advice(
     fit = done(fitted)
     require_sound(fit)
     spec = {**UNTOLD, **fitted.spec, "vehicle": fit["vehicle"], "start": {}}
-    kept = [as_stated(store.measurement(session, run["id"]), run) for run in spec["runs"]]
+    kept = fitted_recordings(fitted, store)
     problem = build_problem(spec, marked_runs(spec, kept, recordings)).as_fitted(fit)
     return advisory_to_json(advise(problem, candidates, planned=request.planned))
 

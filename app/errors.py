@@ -54,6 +54,12 @@ class Conflict(ServiceError):
     code, status = "conflict", 409
 
 
+class Deleted(ServiceError):
+    """A recording that is still needed is no more; asking again is of no use."""
+
+    code, status = "deleted", 410
+
+
 class TooLarge(ServiceError):
     """A body, a file or a result over the limit."""
 

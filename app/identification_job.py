@@ -31,9 +31,7 @@ def of_recordings(task: Task, store: Store, recordings: Recordings) -> Kind:
     """A job kind whose specs are an identification's, bound to where its recordings are kept."""
 
     def payload(job: Job) -> dict[str, Any]:
-        kept = [
-            as_stated(store.measurement(job.session, run["id"]), run) for run in job.spec["runs"]
-        ]
+        kept = [as_stated(store, job.session, run) for run in job.spec["runs"]]
         return {**UNTOLD, **job.spec, "runs": marked_runs(job.spec, kept, recordings)}
 
     return Kind(task=task, payload=payload)
@@ -66,6 +64,12 @@ def filled_in(spec: Mapping[str, Any], problem: Any) -> dict[str, Any]:
         "start": {name: problem.vehicle.value(name) for name in ALL_NAMES if name in started},
         "priors": {one.name: [one.mean, one.deviation] for one in problem.priors},
     }
+
+
+def fitted_recordings(fitted: Job, store: Store) -> list[Measurement]:
+    """The recordings of a fit as it saw them; Deleted where one is no more."""
+    role = "to which this car was fitted"
+    return [as_stated(store, fitted.session, run, role, "fit anew") for run in fitted.spec["runs"]]
 
 
 def marked_runs(

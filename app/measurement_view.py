@@ -40,6 +40,7 @@ def _shown(kept: Measurement, of_session: Sequence[Measurement]) -> dict[str, An
         "needs_mapping": False,
         "sign_suggestions": [],
         "vehicle": None,
+        "plant": None,
         "same_data_as": first and first.id,
         "remarks": remarks,
         **{name: value for name, value in kept.summary.items() if name != "data_sha256"},

@@ -6,21 +6,23 @@ from typing import Any
 from ..engine.errors import ProblemError
 from ..engine.parameters import parameter
 from .errors import Conflict
-from .identification_job import build_problem
+from .identification_job import build_problem, fitted_recordings
 from .job_store import Job
 from .schemas import ProfileRequest
+from .store import Store
 from .worker import Report
 
 KIND = "profile"
 
 
-def check_and_fill(request: ProfileRequest, fitted: Job) -> dict[str, Any]:
+def check_and_fill(request: ProfileRequest, fitted: Job, store: Store) -> dict[str, Any]:
     """Everything that the job needs, checked: what the fit was asked, from where it ended."""
     if fitted.result is None:
         raise Conflict(
             f"The identification has no fit, its state is {fitted.state}; wait, or fit again."
         )
     ended = {one["name"]: one["value"] for one in fitted.result["parameters"]}
+    fitted_recordings(fitted, store)
     name = parameter(request.parameter).name
     if name not in ended:
         raise ProblemError(f"{name} was not free in this fit; free are {', '.join(ended)}.")

@@ -25,7 +25,7 @@ from ..engine.run import Run
 from ..engine.run_notes import doubtful_noise
 from ..engine.simulation.rims_settings import RimsSettings
 from ..engine.step_record import step_records_from_json
-from .errors import NotFound
+from .errors import Deleted, NotFound
 from .store import Measurement, NewMeasurement, Store
 
 if TYPE_CHECKING:
@@ -89,6 +89,7 @@ class Recordings:
             conditioning=done,
             noise=measurement.noise,
             vehicle=measurement.summary.get("vehicle") or run.vehicle,
+            plant=measurement.summary.get("plant") or run.plant,
             warnings=(*run.warnings, *doubtful_noise(measurement.noise, run.channels)),
         )
 
@@ -164,7 +165,7 @@ class Recordings:
         """
         with self.table(measurement) as table:
             found, noise = _by_names(table, measurement.noise)
-        return {**found, "vehicle": measurement.summary.get("vehicle") or found["vehicle"]}, noise
+        return {**found, **named_car(measurement.summary, found)}, noise
 
     def summed_up(self, measurement: Measurement) -> dict[str, Any]:
         """Summary of a measurement as it is used."""
@@ -220,6 +221,11 @@ def _by_names(
     return summary(run), dict(run.noise)
 
 
+def named_car(first: Mapping[str, Any], then: Mapping[str, Any]) -> dict[str, str | None]:
+    """The car that drove, and which virtual one: as one summary names it, else as another."""
+    return {name: first.get(name) or then.get(name) for name in ("vehicle", "plant")}
+
+
 def _size(run: Run) -> int:
     """Numbers in a run."""
     return run.time.size * (1 + len(run.columns))
@@ -266,8 +272,18 @@ def stated(measurement: Measurement) -> dict[str, Any]:
     }
 
 
-def as_stated(measurement: Measurement, kept: Mapping[str, Any]) -> Measurement:
-    """The measurement as it was when a job kept that of it."""
+def as_stated(
+    store: Store,
+    session: str,
+    kept: Mapping[str, Any],
+    role: str = "which this is about",
+    remedy: str = "ask anew",
+) -> Measurement:
+    """A measurement as it was when a job kept that of it; Deleted names it by its role."""
+    try:
+        measurement = store.measurement(session, kept["id"])
+    except NotFound:
+        raise Deleted(f"{kept['name']}, {role}, was deleted; add it again and {remedy}.") from None
     # Jobs of an earlier service say nothing of these, and its sweeps nothing of noise.
     return replace(
         measurement,
@@ -309,6 +325,7 @@ def summary(
         "sign_suggestions": [asdict(one) for one in check_signs(run, sure)],
         "data_sha256": _digest(raw or run),
         "vehicle": run.vehicle or None,
+        "plant": run.plant or None,
     }
 
 
@@ -334,6 +351,7 @@ def _unmapped_summary(table: "Table", reason: MeasurementError) -> dict[str, Any
         "missing": list(missing_for_identification(Run(found.source, nothing, guessed))),
         "sign_suggestions": [],
         "vehicle": None,
+        "plant": None,
     }
 
 

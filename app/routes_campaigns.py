@@ -118,7 +118,11 @@ def _recorded(services: Services, job: Job, recording: Mapping[str, Any]) -> New
     data = _read(services, job, recording["file"])
     new = services.recordings.recorded(data, recording["file"], notes.noise)
     driven = json.loads(_read(services, job, f"{recording['name']}.manoeuvre.json"))
-    return replace(new, manoeuvre=driven, summary={**new.summary, "vehicle": notes.vehicle})
+    return replace(
+        new,
+        manoeuvre=driven,
+        summary={**new.summary, "vehicle": notes.vehicle, "plant": notes.plant},
+    )
 
 
 def _ended(services: Services, sid: str, jid: str) -> Job:

@@ -16,6 +16,7 @@ from . import frames
 from .access import SessionId
 from .downloads import saved_as
 from .measurement_view import measurement_to_json, measurements_to_json
+from .recordings import named_car
 from .routes_simulations import csv_reply, described, frames_reply
 from .services import Services, Shared
 from .store import Measurement
@@ -135,13 +136,14 @@ def _note(services: Services, sid: str, mid: str, received: Upload) -> Measureme
     data = received.read(services.settings.limits.body_bytes)
     notes = parse_notes(data, received.name)
     noise, done = dict(notes.noise), [step_record_to_json(one) for one in notes.conditioning]
-    if not (done or notes.vehicle or noise.keys() & set(OUTPUT_CHANNELS)):
+    car = {"vehicle": notes.vehicle, "plant": notes.plant}
+    if not (done or any(car.values()) or noise.keys() & set(OUTPUT_CHANNELS)):
         raise MeasurementError(
             f"{received.name} states no noise of {', '.join(OUTPUT_CHANNELS)}; write [noise] and "
             'below it lines such as "chassis.z" = 0.0005, in SI, or vehicle = and the name of the '
             "car."
         )
-    told = {**kept.summary, "vehicle": notes.vehicle or kept.summary.get("vehicle")}
+    told = {**kept.summary, **named_car(car, kept.summary)}
     if kept.summary.get("needs_mapping"):
         return services.store.set_notes(sid, kept.id, noise, done, told)
     known = dict(services.recordings.parse(kept, noise).noise)

@@ -28,4 +28,5 @@ async def submit(sid: SessionId, services: Shared, body: ProfileRequest) -> dict
 
 
 def _spec(services: Services, sid: str, body: ProfileRequest) -> dict[str, Any]:
-    return check_and_fill(body, services.jobs.get(sid, body.identification, IDENTIFICATION))
+    fitted = services.jobs.get(sid, body.identification, IDENTIFICATION)
+    return check_and_fill(body, fitted, services.store)

@@ -32,10 +32,7 @@ def sweep(store: Store, recordings: Recordings) -> Kind:
     """The job kind, bound to where its recordings are kept."""
 
     def payload(job: Job) -> dict[str, Any]:
-        runs = [
-            recordings.run(as_stated(store.measurement(job.session, run["id"]), run))
-            for run in job.spec["runs"]
-        ]
+        runs = [recordings.run(as_stated(store, job.session, run)) for run in job.spec["runs"]]
         return {**job.spec, "run": runs[0] if runs else None}
 
     return Kind(task=sweep_cars, payload=payload)

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..engine.vehicle_file import vehicle_from_json
 from .errors import InvalidRequest
-from .identification_job import check_budget, done
+from .identification_job import check_budget, done, fitted_recordings
 from .job_store import Job
 from .jobs import Kind
 from .measurement_view import data_keys
@@ -58,7 +58,7 @@ def check_and_fill(
                 " out or add the run.",
                 field=field,
             )
-    kept = [store.measurement(session, one["id"]) for one in runs]
+    kept = [*fitted_recordings(fitted, store), *held]
     spec = {
         "identification": fitted.id,
         "fit": fit,
@@ -103,7 +103,7 @@ def _runs(spec: Mapping[str, Any], session: str, store: Store, recordings: Recor
     """The recordings with the noise, the braking and the conditioning that the job states."""
     found = []
     for one in spec["runs"]:
-        kept = as_stated(store.measurement(session, one["id"]), one)
+        kept = as_stated(store, session, one)
         found.append(with_braking(recordings.run(kept), spec["braking"].get(one["id"])))
     return found
 

@@ -9,6 +9,7 @@ viser is imported with the first view: it takes longer to load than the rest of 
 import asyncio
 import threading
 import time
+from contextlib import suppress
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,7 +17,7 @@ from pathlib import Path
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.concurrency import run_in_threadpool
-from starlette.websockets import WebSocket
+from starlette.websockets import WebSocket, WebSocketDisconnect
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, WebSocketException
 
@@ -155,16 +156,22 @@ async def relay(websocket: WebSocket, sid: str) -> None:
     try:
         await run_in_threadpool(session_of, websocket, sid)
     except NotFound:
-        await websocket.close(1008)
+        await _hang_up(websocket, 1008)
         return
     viewer = await run_in_threadpool(viewers.watch, sid, 1)
     try:
         await _pass_on(websocket, viewer.address)
     except (OSError, WebSocketException):
-        await websocket.close(1013, "The 3D view is restarting.")
+        await _hang_up(websocket, 1013, "The 3D view is restarting.")
     finally:
         viewer.watchers -= 1
         viewer.seen = time.monotonic()
+
+
+async def _hang_up(websocket: WebSocket, code: int, reason: str = "") -> None:
+    """Tell a tab why it gets nothing more; one that is gone meanwhile need not be told."""
+    with suppress(OSError, WebSocketDisconnect):
+        await websocket.close(code, reason)
 
 
 async def _pass_on(websocket: WebSocket, address: str) -> None:

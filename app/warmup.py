@@ -16,6 +16,8 @@ from .samples import sample_project
 
 log = logging.getLogger(__name__)
 
+LOADING = "Loading the compiled model; a matter of seconds."
+
 FIRST_START = "Compiling the model; the first start takes half a minute, or somewhat more."
 
 State = Literal["compiling", "ready", "failed"]
@@ -27,7 +29,7 @@ class WarmUp:
     def __init__(self, work: "Callable[[WarmUp], object]"):
         self._work = work
         self.state: State = "compiling"
-        self.message = FIRST_START
+        self.message = LOADING
         self._ended = threading.Event()
         self.closed = False
         self._apart: list[subprocess.Popen[bytes]] = []
@@ -64,6 +66,7 @@ class WarmUp:
         for done, compiler in enumerate(self._apart):
             self.tell(f"{FIRST_START} Done: {done} of {len(PARTS)} parts.")
             compiler.wait()
+        self.tell(LOADING)
 
     def _run(self) -> None:
         try:

@@ -106,7 +106,15 @@ class Campaign:
         except RideError as error:
             return Recording(name, manoeuvre, None, str(error))
         description = f"{manoeuvre.name}. Simulated: {self.plant.vehicle.name}."
-        kept = Run(name, run.time, run.channels, run.noise, description=description)
+        kept = Run(
+            name,
+            run.time,
+            run.channels,
+            run.noise,
+            description=description,
+            vehicle=self.plant.vehicle.name,
+            plant=self.plant.name,
+        )
         return Recording(name, manoeuvre, kept, driven.failure)
 
     def truth(self) -> dict[str, Any]:

@@ -73,8 +73,7 @@ def read_run(path: str | Path, *, noise: Mapping[str, float] | None = None) -> R
     try:
         with opened(path, path.name) as table:
             run = named_run(table, {**notes.noise, **(noise or {})}, notes.description)
-            vehicle = notes.vehicle or run.vehicle
-            return replace(run, conditioning=notes.conditioning, vehicle=vehicle)
+            return notes.of_car(replace(run, conditioning=notes.conditioning))
     except OSError as error:
         raise MeasurementError(
             f"{path}: the file cannot be read ({error.strerror}); check the path."
@@ -165,7 +164,7 @@ def named_run(table: Table, noise: Mapping[str, float], description: str) -> Run
         description=description or said.description,
         warnings=[*table.warnings, *warnings],
     )
-    return replace(run, vehicle=said.vehicle)
+    return said.of_car(run)
 
 
 def run_from_table(

@@ -22,6 +22,7 @@ class Run:
     braking : (begin, end) in s where the car brakes; None to look for it in a_x
     conditioning : what made these channels of those that were recorded, step by step
     vehicle : name of the car that was driven, where it is known
+    plant : which car of a campaign drove, as `Plant.name`; empty where no virtual one is known
     """
 
     name: str
@@ -33,6 +34,7 @@ class Run:
     braking: tuple[tuple[float, float], ...] | None = None
     conditioning: tuple[StepRecord, ...] = ()
     vehicle: str = ""
+    plant: str = ""
 
     def __post_init__(self) -> None:
         """Check the shapes and bring the channels into the table's order."""

@@ -2,6 +2,7 @@
 
     description = "Manoeuvre 2, wet road"
     vehicle = "BMW 320i"     # that was driven, as its file names it
+    plant = "detailed"       # the virtual car that drove, in a campaign
 
     [noise]                  # standard deviation of the measurement noise by channel, SI
     "chassis.z" = 0.0005     # the quotes may be left off
@@ -15,7 +16,7 @@ import math
 import re
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -43,6 +44,9 @@ LOUDEST = 3
 SHARE_OF_LARGEST = 0.01
 """... if it also exceeds this share of the greatest value of a real recording."""
 
+_TEXTS = ("description", "vehicle", "plant")
+"""Notes that are a text each."""
+
 _NOISE_LINE = re.compile(
     r"^noise of (\S+): (\d+(?:\.\d+)?(?:[eE][+-]?\d+)?) (.+?)\s*$", re.MULTILINE
 )
@@ -50,14 +54,19 @@ _NOISE_LINE = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class RunNotes:
-    """Noise in SI by channel, a text for a person, what conditioning did to the recording, and the
-    name of the car that was driven.
+    """Noise in SI by channel, a text for a person, what conditioning did to the recording, the
+    name of the car that was driven, and which virtual one drove.
     """
 
     noise: Mapping[str, float] = field(default_factory=dict)
     description: str = ""
     conditioning: tuple[StepRecord, ...] = ()
     vehicle: str = ""
+    plant: str = ""
+
+    def of_car(self, run: Run) -> Run:
+        """The run, of the car that the notes name where they do."""
+        return replace(run, vehicle=self.vehicle or run.vehicle, plant=self.plant or run.plant)
 
 
 def notes_beside(recording: Path) -> Path:
@@ -79,13 +88,11 @@ def parse_notes(data: bytes, source: str) -> RunNotes:
     """The notes in the bytes of a file; `source` heads every message."""
     notes = parse_toml(data, source)
     for name in notes:
-        near = get_close_matches(
-            name.lower(), ("noise", "description", "vehicle"), n=1, cutoff=0.75
-        )
+        near = get_close_matches(name.lower(), ("noise", *_TEXTS), n=1, cutoff=0.75)
         if near and near[0] != name:
             raise MeasurementError(f"{source}: {name} is not known; did you mean {near[0]}?")
     noise = notes.get("noise", {})
-    texts = {name: notes.get(name, "") for name in ("description", "vehicle")}
+    texts = {name: notes.get(name, "") for name in _TEXTS}
     for name, text in texts.items():
         if not isinstance(text, str):
             raise MeasurementError(f"{source}: {name} must be a text in quotes.")
@@ -100,7 +107,8 @@ def parse_notes(data: bytes, source: str) -> RunNotes:
 def notes_of(run: Run) -> str:
     """What a run knows of itself as the text of a file that `parse_notes` reads."""
     lines = [f"description = {toml_value(run.description)}"]
-    lines += [f"vehicle = {toml_value(run.vehicle)}"] if run.vehicle else []
+    known = {"vehicle": run.vehicle, "plant": run.plant}
+    lines += [f"{name} = {toml_value(text)}" for name, text in known.items() if text]
     lines += toml_table("[noise]", run.noise)
     for record in map(step_record_to_json, run.conditioning):
         lists = {name: one for name, one in record.items() if isinstance(one, list)}
@@ -113,7 +121,7 @@ def notes_of(run: Run) -> str:
 
 def notes_in(comment: str) -> RunNotes:
     """The notes that a recording of ours carries in its own header, one a line; see `mdf4`."""
-    said = re.findall(r"^(description|vehicle): (.*)$", comment, re.MULTILINE)
+    said = re.findall(rf"^({'|'.join(_TEXTS)}): (.*)$", comment, re.MULTILINE)
     texts = dict(reversed(said))  # the first of each counts
     noise = {}
     for name, value, unit in _NOISE_LINE.findall(comment):

@@ -18,7 +18,8 @@ const FIRST = 6;
 let advice = null;
 /** The identification that it is about. */
 let about = null;
-let problem = "";
+/** Why there is none, a refusal. */
+let problem = null;
 let asking = false;
 let chosen = null;
 let all = false;
@@ -34,7 +35,7 @@ export const given = () => advice;
 
 async function ask(job) {
   about = job.id;
-  [advice, problem, chosen, all, asking] = [null, "", null, false, true];
+  [advice, problem, chosen, all, asking] = [null, null, null, false, true];
   show();
   try {
     const found = await api.advise({ identification: job.id });
@@ -44,7 +45,7 @@ async function ask(job) {
   } catch (error) {
     if (error.code === undefined) throw error;
     if (error.lost) set({ online: false });
-    if (about === job.id) problem = error.message;
+    if (about === job.id) problem = error;
   } finally {
     if (about === job.id) asking = false;
   }
@@ -55,8 +56,9 @@ async function ask(job) {
 export function view(job, hooks) {
   if (about !== job.id && !asking) setTimeout(() => ask(job));
   if (problem && about === job.id) {
-    return h("div", { className: "problem", role: "alert" }, h("p", {}, problem),
-      h("button", { type: "button", on: { click: () => ask(job) } }, "Try again"));
+    return h("div", { className: "problem", role: "alert" }, h("p", {}, problem.message),
+      problem.code === "deleted" ? null
+        : h("button", { type: "button", on: { click: () => ask(job) } }, "Try again"));
   }
   if (!advice || about !== job.id) {
     return h("p", { className: "empty", role: "status" },
@@ -76,6 +78,7 @@ function list() {
   const shown = all ? advice.candidates : advice.candidates.slice(0, FIRST);
   const more = advice.candidates.length - shown.length;
   return [
+    advice.warnings.length ? h("ul", { className: "warnings" }, advice.warnings.map((text) => h("li", {}, text))) : null,
     h("ol", { className: "candidates" }, shown.map((one) => h("li", {},
       h("button", { type: "button", "aria-pressed": one.key === chosen, id: `candidate-${one.key}`,
         on: { click: () => { chosen = one.key; show(); } } },

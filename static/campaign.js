@@ -5,7 +5,9 @@ import * as form from "./campaign_form.js";
 import { take } from "./car.js";
 import { fold, h, inPlace } from "./dom.js";
 import { jobs } from "./job.js";
+import { nameOf, ofAnotherPlant } from "./names.js";
 import { notice, refused } from "./notices.js";
+import { fitToo, fitted } from "./setup.js";
 import { get, on, set } from "./store.js";
 import * as units from "./units.js";
 
@@ -73,13 +75,26 @@ async function takeOver() {
     const held = new Set(get("measurements").map(({ id }) => id));
     const added = rows.filter(({ id }) => !held.has(id));
     set({ measurements: [...get("measurements"), ...added] });
-    const count = added.length;
-    if (count) {
-      notice("info", `${count} ${count > 1 ? "recordings are" : "recording is"} in`,
-        `The campaign drove ${count > 1 ? "them" : "it"}.`);
-    }
+    if (added.length) tell(added);
   } catch (error) {
     refused(error, "Adding the recordings");
+  }
+}
+
+/** What is there now, and that the next fit takes it only where it is told to. */
+function tell(added) {
+  const them = added.length > 1 ? "them" : "it";
+  const title = `${added.length} ${added.length > 1 ? "recordings are" : "recording is"} in`;
+  const usable = added.filter((run) => run.usable_for_identification);
+  const [first] = fitted();
+  if (!usable.length || !first || usable.includes(first)) {
+    notice("info", title, `The campaign drove ${them}.`);
+  } else if (ofAnotherPlant(usable[0], first)) {
+    notice("info", title, `The ${usable[0].plant} car drove ${them}, another car than that of ${nameOf(first.id)}: ` +
+      `not in its fit.`);
+  } else {
+    notice("warning", title, `The campaign drove ${them}; the next fit is of ${fitted().map(({ id }) => nameOf(id)).join(", ")} alone.`,
+      { label: `Fit ${them} too`, run: () => fitToo(usable) });
   }
 }
 

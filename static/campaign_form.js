@@ -27,6 +27,7 @@ let failure = "";
 export function build({ onChange, onSubmit, tools }) {
   changed = onChange;
   parts.noise = h("p", { className: "hint" });
+  parts.driver = h("p", { className: "hint", id: "campaign-driver" });
   parts.sensors = h("div", { className: "campaign-sensors" });
   parts.more = h("summary");
   parts.manoeuvres = h("fieldset", { className: "campaign-manoeuvres" });
@@ -36,9 +37,9 @@ export function build({ onChange, onSubmit, tools }) {
     on: { submit: (event) => { event.preventDefault(); onSubmit(); }, change: follow } },
   parts.manoeuvres,
   h("div", { className: "campaign-fields" },
-    select("plant", "Car", get("plants"),
-      "The car that drives and is measured: the concept car is the sliders', the detailed one a " +
-      "multibody car that takes a minute or so a drive"),
+    select("car", "Car", [],
+      "The car that drives and is measured: the concept model with the sliders' or the fitted parameters, " +
+      "or the detailed multibody car, which takes a minute or so a drive"),
     number("class_factor", "Road class factor", { min: "0", step: "any", placeholder: "as it is" },
       "Times the power of every random road at the mean of its class: 1 is the mean, 0.5 the lower " +
       "limit, 2 the upper; empty: as the manoeuvre has it"),
@@ -46,12 +47,44 @@ export function build({ onChange, onSubmit, tools }) {
       "Standard deviation of white noise on z, pitch and roll"),
     number("seed", "Seed of the noise", { min: "0", step: "1", value: "0", required: true },
       "Another whole number draws other noise")),
-  parts.noise, missing("plants"), more(), tools);
+  parts.driver, parts.noise, missing("plants"), more(), tools);
   // A field that the browser refuses must be in sight to be told of.
   form.addEventListener("invalid", ({ target }) => { target.closest("details").open = true; }, true);
+  listCars(get("plants")[0].key);
+  on("fitJob", () => { listCars(fields.car.value); follow(); });
+  on("vehicle", follow);
   showSensors();
   follow();
   return form;
+}
+
+/**
+ * The cars that can be driven: {key, plant, fitted, label, vehicle(), said()}. A plant that takes a vehicle drives
+ * that of the sliders and, once there is a fit, the fitted one.
+ */
+function cars() {
+  return get("plants").flatMap((plant) => {
+    const { key, name, missing: why } = plant;
+    if (!plant.takes_vehicle) {
+      return [{ key, plant, label: name, missing: why, vehicle: () => null, said: () => `The ${name.toLowerCase()} drives.` }];
+    }
+    const onSliders = () => withValues(get("vehicle"), get("values"));
+    const fitted = get("fit") && { key: `${key}-fitted`, plant, fitted: true, label: "Fitted car", missing: why,
+      vehicle: () => get("fit").vehicle, said: () => drivenBy("fitted car", get("fit").vehicle) };
+    return [{ key, plant, label: "Sliders' car", missing: why, vehicle: onSliders,
+      said: () => drivenBy("car on the sliders", get("vehicle")) }, fitted].filter(Boolean);
+  });
+}
+
+/** What a run of the concept car is, and is not. */
+const drivenBy = (which, { name }) => `The ${which}, “${name}”, drives: what the model says of it, not a measured car.`;
+
+const car = () => cars().find(({ key }) => key === fields.car.value);
+
+function listCars(chosenKey) {
+  fields.car.replaceChildren(...cars().map(({ key, label, missing: why }) => option(key, label, why)));
+  fields.car.value = chosenKey;
+  if (!car()) fields.car.value = get("plants")[0].key;
 }
 
 /** What can be driven, with these keys chosen. */
@@ -60,9 +93,16 @@ function list(keys) {
     ...get("manoeuvres").filter(({ kind }) => kind === "road").map((one) => manoeuvre(one, keys)));
 }
 
-/** Choose one manoeuvre, and no other. */
+/**
+ * Choose one manoeuvre, and no other, for the car that a fit is about: that which drove its runs where it
+ * brings its own data, else the fitted one.
+ */
 export function choose(key) {
   list([key]);
+  const of = get("measurements").filter(({ id }) => get("fitJob").runs.some((run) => run.id === id));
+  const drove = ({ plant, missing: why }) =>
+    !why && !plant.takes_vehicle && of.some((run) => run.plant === plant.key);
+  listCars((cars().find(drove) ?? cars().find(({ fitted }) => fitted)).key);
   follow();
   parts.manoeuvres.querySelector("input:checked")?.scrollIntoView({ block: "nearest" });
 }
@@ -89,10 +129,13 @@ function manoeuvre({ key, name, duration }, keys) {
 
 /** Of {key, name, missing}; what is missing cannot be chosen. */
 function select(key, label, options, title) {
-  fields[key] = h("select", { id: `campaign-${key}`, title }, options.map(({ key: value, name, missing: why }) =>
-    h("option", { value, disabled: Boolean(why), title: why }, why ? `${name}: not installed` : name)));
+  fields[key] = h("select", { id: `campaign-${key}`, title },
+    options.map(({ key: value, name, missing: why }) => option(value, name, why)));
   return h("label", { className: "block" }, label, fields[key]);
 }
+
+const option = (value, name, why) =>
+  h("option", { value, disabled: Boolean(why), title: why }, why ? `${name}: not installed` : name);
 
 function number(key, label, properties, title) {
   fields[key] = h("input", { type: "number", id: `campaign-${key}`, title, ...properties });
@@ -125,7 +168,6 @@ function driven() {
     : rows.map(({ key }) => key);
 }
 
-const plant = () => get("plants").find(({ key }) => key === fields.plant.value);
 const typed = (key) => (fields[key].value === "" ? null : Number(fields[key].value));
 
 function band() {
@@ -135,8 +177,8 @@ function band() {
 
 /** What the service is asked for. */
 export const request = () => ({
-  plant: plant().key,
-  vehicle: plant().takes_vehicle ? withValues(get("vehicle"), get("values")) : null,
+  plant: car().plant.key,
+  vehicle: car().vehicle(),
   manoeuvres: driven(),
   class_factor: typed("class_factor"),
   band: band(),
@@ -156,7 +198,7 @@ export function extent() {
   const lasting = get("manoeuvres").filter(({ key }) => keys.includes(key))
     .reduce((sum, { duration }) => sum + duration, 0);
   return `${keys.length} ${keys.length > 1 ? "drives" : "drive"}, ${units.plain(lasting, 4)} s` +
-    taking(lasting * plant().effort, "to compute");
+    taking(lasting * car().plant.effort, "to compute");
 }
 
 /** ", about 2 min" and a word; nothing for a short time. */
@@ -171,6 +213,7 @@ function follow() {
   const half = (typed("band_low") === null) !== (typed("band_high") === null);
   fields.band_high.setCustomValidity(half ? "Give both ends of the band, or neither." : "");
   fields.noise.disabled = chosenSensors !== null;
+  parts.driver.textContent = car().said();
   parts.noise.textContent = noiseSaid();
   parts.more.textContent = `Roads, sensors, format: ${moreSaid()}`;
   changed();

@@ -33,7 +33,7 @@ export async function take(vehicle, what) {
     const saved = (await api.saveVehicle(vehicle)) ?? vehicle;
     await api.saveBaseline(saved);
     holdDampers();
-    set({ vehicle: saved, baseline: saved, values: valuesOf(saved), fit: null });
+    set({ vehicle: saved, baseline: saved, values: valuesOf(saved) });
     notice("info", what, `Sliders and baseline now hold “${saved.name}”.`);
   } catch (error) {
     if (error.lost) set({ online: false });

@@ -1,6 +1,6 @@
 // How the errors of a fit's parameters hang together: a heat map, and the pairs that trade.
 
-import { h } from "./dom.js";
+import { counted, h } from "./dom.js";
 import { formula, symbolOf } from "./formula.js";
 import * as units from "./units.js";
 
@@ -97,5 +97,5 @@ function pairs({ correlation, verdict }, names) {
             h("span", { className: "formula" }, formula(known.symbol))) : null),
         h("td", { className: "strong" }, units.fixed(value, 3)));
     }))),
-    found.length > MOST_PAIRS ? h("p", { className: "hint" }, `and ${found.length - MOST_PAIRS} pairs more`) : null);
+    found.length > MOST_PAIRS ? h("p", { className: "hint" }, `and ${counted(found.length - MOST_PAIRS, "pair")} more`) : null);
 }

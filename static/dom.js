@@ -21,6 +21,9 @@ export function h(tag, props = {}, ...children) {
 
 export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
+/** "1 step", "2 steps". */
+export const counted = (count, noun) => `${count} ${noun}${count === 1 ? "" : "s"}`;
+
 /** Hand a file to the visitor: a blob, or data to be written as JSON. */
 export function saveFile(content, name) {
   const blob = content instanceof Blob ? content

@@ -4,6 +4,9 @@
 export const RECORDINGS = ".csv,.txt,.tsv,.dat,.asc,.mf4,.mdf,.mf3,.mat,.h5,.hdf5,.hdf,.tdms,.uff,.unv,.uf58,"
   + ".rsp,.rpc,.tim,.drv,.parquet,.erg,.zip,text/csv";
 
+/** A file that is of no use where it was put, in words for a person. */
+export class Misplaced extends Error {}
+
 const has = (data, ...keys) => keys.every((key) => data[key] !== undefined);
 const isObject = (data) => data !== null && typeof data === "object" && !Array.isArray(data);
 const everyHas = (list, key) => Array.isArray(list) && list.length > 0
@@ -27,17 +30,17 @@ const JSON_KINDS = [
     "a vehicle file names chassis, front and rear"],
 ];
 
-/** "vehicle" or "mapping" with the data of a JSON file; an Error says where anything else belongs. */
+/** "vehicle" or "mapping" with the data of a JSON file; Misplaced says where anything else belongs. */
 export async function kindOfJson(file) {
   let data;
   try {
     data = JSON.parse(await file.text());
   } catch {
-    throw new Error("It is not JSON, whatever its name says; open it in an editor and mend it.");
+    throw new Misplaced("It is not JSON, whatever its name says; open it in an editor and mend it.");
   }
   const [, what, where] = JSON_KINDS.find(([fits]) => data !== null && typeof data === "object" && fits(data))
     ?? [null, "JSON of another program", "the page takes vehicles, mappings and NAME.manoeuvre.json"];
-  if (where) throw new Error(`It seems to be ${what}; ${where}.`);
+  if (where) throw new Misplaced(`It seems to be ${what}; ${where}.`);
   return { kind: what, data };
 }
 
@@ -46,10 +49,10 @@ export async function requireNotes(file) {
   const text = await file.text();
   if (/^\s*(\[\s*noise\b|noise\s*(\.|=\s*\{))/m.test(text)) return;
   if (/^\s*\[\s*(sensors|points)\b/m.test(text)) {
-    throw new Error("It seems to be the sensors of a campaign; choose it under Measurements, Drive a campaign, " +
+    throw new Misplaced("It seems to be the sensors of a campaign; choose it under Measurements, Drive a campaign, " +
       "Roads, sensors, format.");
   }
   if (/^\s*\[?\s*(chassis|front|rear|brakes)\b/m.test(text)) {
-    throw new Error("It seems to be a car; a vehicle file is JSON, as Save file of the Car tab writes it.");
+    throw new Misplaced("It seems to be a car; a vehicle file is JSON, as Save file of the Car tab writes it.");
   }
 }

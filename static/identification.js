@@ -34,11 +34,11 @@ export function build(callbacks) {
   });
   free.build();
   fit.build(() => { if (view === "fit") show(); });
-  on("measurements ride", () => {
+  on("measurements ride use", () => {
     const panel = $("#identification");
     if (view === "setup" && !panel.hidden && !panel.contains(document.activeElement)) show();
   });
-  on("measurements ride", saidOfRuns);
+  on("measurements ride use", saidOfRuns);
   on("vehicle", () => { if (view === "fit") show(); });
   on("values", () => { if (view === "setup" && !$("#identification").hidden) free.askBounds(); });
   show();
@@ -59,7 +59,7 @@ export async function resume() {
   const job = current();
   if (!job) return;
   view = "fit";
-  if (done && done.id !== job.id) set({ fit: (await api.job("identifications", done.id)).result, fitJob: done });
+  if (done && done.id !== job.id) hold(await api.job("identifications", done.id));
   if (!busy()) await ended();
   if (get("fitJob")) await profile.resume(get("fitJob").id);
   show();
@@ -108,10 +108,13 @@ function advance() {
   if (view === "fit") result.advance(current());
 }
 
+/** A fit and the identification that found it are one. */
+const hold = (job) => set({ fit: job.result, fitJob: job });
+
 async function ended() {
   const job = current();
   if (job.state !== "done") return;
-  set({ fit: job.result, fitJob: job });
+  hold(job);
   show();
   await scoreHoldouts();
 }

@@ -184,7 +184,7 @@ function applyFit(result) {
 function status() {
   const run = get("now");
   $("#status").textContent = !get("online") ? "no connection"
-    : !get("ready") ? "compiling"
+    : !get("ready") ? "getting ready"
     : get("trouble") ? "not simulated"
     : run ? `simulated in ${units.number(1000 * (run.head.seconds ?? 0), 2)} ms` : "simulating …";
 }

@@ -2,10 +2,10 @@
 // driven; see how far each is on its way from file to run; look, delete.
 
 import * as api from "./api.js";
-import { $, breakable, h, inPlace } from "./dom.js";
-import { RECORDINGS, kindOfJson, requireNotes } from "./file_kinds.js";
+import { $, breakable, capital, h, inPlace } from "./dom.js";
+import { Misplaced, RECORDINGS, kindOfJson, requireNotes } from "./file_kinds.js";
 import * as intake from "./intake.js";
-import { dataOf, lacks, nameOf, original } from "./names.js";
+import { dataOf, drivenBy, lacks, nameOf, original } from "./names.js";
 import { sentence } from "./noise.js";
 import { notice } from "./notices.js";
 import { AXIS, COLOURS, fitWidth } from "./plots.js";
@@ -77,13 +77,19 @@ async function sort(files) {
       if (kind === "vehicle") hooks.takeVehicle(file);
       else await keepMapping(file, data);
     } catch (error) {
-      if (error.lost) set({ online: false });
-      refusals.push({ name: file.name, error });
+      refuse(refusals, file, error);
     }
   }
   if (!ours.length && !refusals.length) return;
   hooks.open();
   add(ours, refusals);
+}
+
+/** Note why a file was not taken; what went wrong in the page itself is no reason of the file's. */
+function refuse(refusals, { name }, error) {
+  if (error.lost) set({ online: false });
+  if (error instanceof api.Refusal || error instanceof Misplaced) refusals.push({ name, error });
+  else reportError(error);
 }
 
 /** A mapping file becomes a template. */
@@ -102,8 +108,7 @@ async function add(files, refusals) {
     try {
       await (beside(file) ? attach(file, beside(file)) : take(file));
     } catch (error) {
-      failures.push({ name: file.name, error });
-      if (error.lost) set({ online: false });
+      refuse(failures, file, error);
     }
   }
   parts.busy = null;
@@ -164,7 +169,7 @@ async function attach(file, { end, attach: send, told, say }) {
   const stem = file.name.replace(end, "");
   const row = get("measurements").findLast(({ name }) => name.replace(/\.\w+$/, "") === stem);
   if (!row) {
-    throw new Error(`No recording here is called ${stem}.csv, whose ${told} it could ` +
+    throw new Misplaced(`No recording here is called ${stem}.csv, whose ${told} it could ` +
       "state; add the recording first, or with it.");
   }
   const noted = await send(row.id, file);
@@ -298,6 +303,7 @@ function detail(row) {
       : h("p", { className: "hint" }, stageTold(row, stage)),
     ...(names.length ? [h("div", { className: "row-tools" }, choice, facts), drawing] : []),
     h("p", { className: "hint" }, sentence(row)),
+    row.plant ? h("p", { className: "hint" }, capital(`${drivenBy(row)}.`)) : null,
     h("p", { className: "hint" }, driven(row), row.manoeuvre
       ? [" ", h("button", { type: "button", title: "It was another road, or another drive",
         on: { click: () => forget(row) } }, "Forget")] : null),

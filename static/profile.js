@@ -20,6 +20,8 @@ const found = {};
 let chosen = null;
 /** The identification of the newest question, which may not have been sent yet. */
 let about = null;
+/** Why the newest question was refused: the refusal, with the fit's id and the parameter. */
+let refusal = null;
 let show = () => {};
 const { now: current, busy, start: send, resume: takeUp, cancel } =
   jobs("profiles", "profile", { changed: () => show(), ended: keep });
@@ -51,6 +53,8 @@ async function keep() {
   if (current().result) keepOne(current());
 }
 
+const wasRefused = (fitted, name) => refusal?.identification === fitted.id && refusal.parameter === name;
+
 const isOf = (job) => current()?.identification === job.id;
 
 /** Whether there is anything to look at for a fit. */
@@ -58,16 +62,22 @@ export const asked = (job) => Boolean(found[job.id]) || about === job.id || isOf
 
 /** Ask for the profile of a parameter, or show it where it is known. */
 export function ask(job, name) {
-  [chosen, about] = [name, job.id];
+  [chosen, about, refusal] = [name, job.id, null];
   if (found[job.id]?.[name] || (isOf(job) && busy() && current().parameter === name)) show();
   else if (busy()) refused(Object.assign(new Error("Another profile is under way; wait for it, or cancel it."),
     { code: "busy" }), "The profile");
-  else send(() => ({ identification: job.id, parameter: name, key: crypto.randomUUID?.() ?? String(Math.random()).slice(2) }));
+  else {
+    send(() => ({ identification: job.id, parameter: name, key: crypto.randomUUID?.() ?? String(Math.random()).slice(2) }),
+      (error) => {
+        if (error.code === undefined) throw error;
+        refusal = { error, identification: job.id, parameter: name };
+      });
+  }
 }
 
 export function view(job) {
   const known = found[job.id] ?? {};
-  const name = known[chosen] || (isOf(job) && current().parameter === chosen) ? chosen : Object.keys(known)[0] ?? chosen;
+  const name = known[chosen] || wasRefused(job, chosen) || (isOf(job) && current().parameter === chosen) ? chosen : Object.keys(known)[0] ?? chosen;
   const others = h("div", { className: "profile-others" });
   const profile = known[name];
   return h("div", { className: "fit-two" },
@@ -97,6 +107,10 @@ function waiting(fitted, name) {
         : `${units.parameter(job.parameter).label}: ${points} points fitted; each is a fit of all other parameters.`));
   }
   const again = name ? h("button", { type: "button", on: { click: () => ask(fitted, name) } }, "Try again") : null;
+  if (wasRefused(fitted, name)) {
+    const { message, code } = refusal.error;
+    return h("div", { className: "problem", role: "alert" }, h("p", {}, message), code === "deleted" ? null : again);
+  }
   const own = isOf(fitted) && job.parameter === name;
   if (own && job.error) return h("div", { className: "problem", role: "alert" }, h("p", {}, job.error.detail), again);
   return h("p", { className: "empty" }, own && job.state === "cancelled" ? "Cancelled. " : "", again);

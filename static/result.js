@@ -4,7 +4,7 @@ import { percent, short } from "./comfort.js";
 import { isOfThisCar } from "./controls.js";
 import { costChart } from "./cost.js";
 import { DETERMINED, mark, WORDS } from "./determined.js";
-import { $, breakable, capital, fileName, h, saveFile, symbol } from "./dom.js";
+import { $, breakable, capital, counted, fileName, h, saveFile, symbol } from "./dom.js";
 import { span } from "./intervals.js";
 import { distinct, nameOf } from "./names.js";
 import * as sensors from "./sensors_form.js";
@@ -115,7 +115,7 @@ export function advance(job) {
   const stage = $("#stage-of-fit");
   if (stage) stage.textContent = stageOf(job);
   $("#cost-now").textContent = last === undefined || last === null ? before
-    : `${units.number(last, 4)} after ${history.length} steps, ${simulations} simulations` +
+    : `${units.number(last, 4)} after ${counted(history.length, "step")}, ${counted(simulations, "simulation")}` +
       (job.result ? `, ${units.number(job.result.seconds, 2)} s` : "");
 }
 

@@ -2,7 +2,7 @@
 
 import { breakable, h } from "./dom.js";
 import * as free from "./free.js";
-import { dataOf, lacks, nameOf, ofAnotherCar, original } from "./names.js";
+import { dataOf, drivenBy, lacks, nameOf, ofAnotherCar, ofAnotherPlant, original } from "./names.js";
 import * as noise from "./noise.js";
 import * as preparation from "./preparation.js";
 import * as search from "./search_form.js";
@@ -12,22 +12,28 @@ const USES = { fit: "fit", hold_out: "hold out", leave_out: "leave out" };
 
 /**
  * How a run is used: unless chosen, the ride on show (or the first) is fitted and others held out, but
- * those of another car than the one of that name.
+ * those of another car than the one of that name, or than the virtual one that drove `like` (untold: the run fitted).
  */
-function useOf(run, car = get("vehicle").name) {
+function useOf(run, car = get("vehicle").name, like = null) {
   if (!run.usable_for_identification) return "leave_out";
   if (get("use")[run.id]) return get("use")[run.id];
   const usable = get("measurements").filter((m) => m.usable_for_identification);
   const { kind, id } = get("ride");
   const shown = usable.find((m) => kind === "measurement" && m.id === id) ?? usable[0];
   if (run === shown) return "fit";
-  return dataOf(run) === dataOf(shown) || original(run) || ofAnotherCar(run, car) ? "leave_out" : "hold_out";
+  const { plant } = like ?? shown;
+  const stranger = ofAnotherCar(run, car) || (run.plant && plant && run.plant !== plant);
+  return dataOf(run) === dataOf(shown) || original(run) || stranger ? "leave_out" : "hold_out";
 }
 
 export const fitted = () => get("measurements").filter((run) => useOf(run) === "fit");
 
 /** Runs to score beside those fitted: what was fitted under another name is not unseen. */
-export const heldOut = (seen, car) => unseen(seen).filter((run) => useOf(run, car) !== "leave_out");
+export const heldOut = (seen, car) => unseen(seen).filter((run) => useOf(run, car, seen[0]) !== "leave_out");
+
+/** Fit some runs beside those that are fitted now. */
+export const fitToo = (runs) =>
+  set({ use: { ...get("use"), ...Object.fromEntries([...fitted(), ...runs].map(({ id }) => [id, "fit"])) } });
 
 /** Usable runs with other data than these. */
 export function unseen(seen) {
@@ -77,8 +83,12 @@ function copied(run) {
 }
 
 function ofAnother(run) {
-  return ofAnotherCar(run, get("vehicle").name)
-    ? h("span", { className: "hint" }, "recorded with another car: ", run.vehicle) : null;
+  if (ofAnotherCar(run, get("vehicle").name)) {
+    return h("span", { className: "hint" }, "recorded with another car: ", run.vehicle);
+  }
+  const [first] = fitted();
+  return first && ofAnotherPlant(run, first)
+    ? h("span", { className: "hint" }, "another car than that fitted: ", drivenBy(run)) : null;
 }
 
 function select(options, value, change, properties) {

@@ -29,8 +29,9 @@
 //   valuesNow    the sliders' values with which `now` was simulated
 //   bands        95 % bands of `now` by the errors of the fit (a run with X.lower, X.upper), or null
 //   trouble      why the last simulation was refused (its `values` with which sliders), or null
-//   fit          the last finished fit (fit.json) or null: the sliders' error bars
-//   fitJob       the identification that found it (its id and runs)
+//   fitJob       the last identification that is done, or null; set by identification.js alone. Another
+//                car on the sliders leaves it: what was found stays found, of the car it was found for
+//   fit          its result (fit.json), null without one
 //   ready        the service has compiled its kernels
 //   online       the service answers
 
@@ -39,12 +40,20 @@ const listeners = [];
 
 export const get = (key) => state[key];
 
-/** Change keys and tell whoever listens to one of them. */
+/**
+ * Change keys and tell whoever listens to one of them. A listener that fails is reported where errors
+ * of the page are: neither the others nor whoever made the change have anything to do with it.
+ */
 export function set(changes) {
   const keys = Object.keys(changes).filter((key) => state[key] !== changes[key]);
   Object.assign(state, changes);
   for (const { names, fn } of listeners) {
-    if (keys.some((key) => names.includes(key))) fn(state);
+    if (!keys.some((key) => names.includes(key))) continue;
+    try {
+      fn(state);
+    } catch (error) {
+      reportError(error);
+    }
   }
 }
 

@@ -29,7 +29,7 @@ export { current };
 
 /** Build the panel. */
 export function build() {
-  on("fitJob measurements use", show);
+  on("fitJob measurements use vehicle", show);
   show();
 }
 
@@ -94,6 +94,8 @@ function content() {
   return [
     h("ul", { className: "runs" }, seen.map((run) => runRow(run, h("span", { className: "soft" }, "fitted"))),
       others.map((run) => runRow(run, holding(run, holdOut.includes(run))))),
+    get("vehicle").name === car() ? null
+      : h("p", { className: "hint", id: "predicts" }, `The fitted car, “${car()}”, predicts, not the one on the sliders.`),
     pivots.view(),
     h("div", { className: "row-tools" },
       busy() ? h("button", { type: "button", id: "cancel-validation", className: "danger", on: { click: cancel } },

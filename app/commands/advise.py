@@ -102,7 +102,9 @@ def _is_json(name: str) -> bool:
 
 
 def print_advisory(found: Advisory) -> None:
-    """Print what is known, then the candidates by rank."""
+    """Print what is doubtful and what is known, then the candidates by rank."""
+    for warning in found.warnings:
+        print(f"Warning: {warning}")
     best = found.ranked[0] if found.ranked else None
     rows = [("parameter", "error %", "determined", *((f"after {best.key} %",) if best else ()))]
     for place, one in enumerate(found.now):

@@ -37,7 +37,8 @@ def condition(options: Namespace) -> None:
     for record in done.conditioning[len(run.conditioning) :]:
         print(f"{record.step['kind']}: {' '.join(record.sentences)}")
         print_warnings(record.warnings)
-    print(f"{len(steps)} steps, {done.time.size} samples over {done.duration:.4g} s.")
+    count = f"{len(steps)} step{'' if len(steps) == 1 else 's'}"
+    print(f"{count}, {done.time.size} samples over {done.duration:.4g} s.")
     _print_use(done, suggestion)
     if options.output:
         write_file(options.output, run_to_csv(done))

@@ -17,6 +17,7 @@ def advisory_to_json(advisory: Advisory) -> dict[str, Any]:
             "candidates": [_candidate(one) for one in advisory.ranked],
             "together": [_candidate(one) for one in advisory.together],
             "excluded": [{"key": key, "why": why} for key, why in advisory.excluded.items()],
+            "warnings": list(advisory.warnings),
             "seconds": advisory.seconds,
         }
     )

@@ -24,7 +24,7 @@ import math
 import time
 from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -40,6 +40,7 @@ from ..simulation.simulate import SAMPLE_STEP, rims_batch
 from ..units import in_percent
 from ..vehicle import Vehicle
 from .candidates import Drive, catalogue, drives
+from .cars import mixed_plants
 from .expected_noise import INPUT_NOISE, ExpectedNoise, noise_of_runs, stated_noise
 from .fit import Outcome, determined
 from .fit_findings import fault_sentences, faults_of_channels
@@ -121,6 +122,7 @@ class Advisory:
     ranked : each candidate alone, the best first
     together : the best one, what is best after it, and so on; each with what all up to it give
     excluded : by key, why a candidate gives no run
+    warnings : sentences about what is doubtful in the runs so far
     """
 
     now: tuple[Knowledge, ...]
@@ -129,6 +131,7 @@ class Advisory:
     together: tuple[Advice, ...]
     excluded: Mapping[str, str]
     seconds: float
+    warnings: tuple[str, ...] = ()
 
 
 def advise(
@@ -160,7 +163,9 @@ def advise(
     said = information(runs)
     noise = noise_of_runs(problem, runs, said.root)
     known = sum(residuals.of_priors(), start=said).marginal(of_all_runs(problem.variables))
-    return _advised(problem, known, noise, candidates or catalogue(), planned, began)
+    found = _advised(problem, known, noise, candidates or catalogue(), planned, began)
+    mixed = mixed_plants({seen.name: seen.plant for seen in problem.runs})
+    return replace(found, warnings=tuple(mixed))
 
 
 def require_sound(fit: Mapping[str, Any]) -> None:

@@ -15,6 +15,7 @@ from ..run_notes import DEFAULT_NOISE
 from ..simulation.rims import RimsInputs, filtered_outputs, prepare
 from ..simulation.rims_settings import RimsSettings
 from ..vehicle import Vehicle
+from .cars import another_car
 from .noise_source import NoiseSource
 from .sensing import corrected, where_driven
 from .sensor_model import SensorModel
@@ -39,6 +40,7 @@ class ComparedRun:
     noise : channel -> standard deviation of what is read, SI
     noise_source : channel -> where that is from
     warnings : sentences about the run
+    plant : which virtual car drove, as `Run.plant`
     """
 
     name: str
@@ -47,6 +49,7 @@ class ComparedRun:
     noise: Mapping[str, float]
     noise_source: Mapping[str, NoiseSource]
     warnings: tuple[str, ...] = ()
+    plant: str = ""
 
 
 def compared_runs(
@@ -117,6 +120,7 @@ def compared_runs(
                 {channel: float(told[channel]) for channel in compared},
                 {channel: _source(channel, run, typed) for channel in compared},
                 (*another_car(run, vehicle), *inputs.warnings),
+                run.plant,
             )
         )
     return tuple(found)
@@ -126,16 +130,6 @@ def _source(channel: str, run: Run, typed: Mapping[str, float]) -> NoiseSource:
     if channel in typed:
         return "typed"
     return "stated" if channel in run.noise else "default"
-
-
-def another_car(run: Run, vehicle: Vehicle) -> list[str]:
-    """A sentence where a run is known to be of another car than the one that follows it."""
-    if run.vehicle in ("", vehicle.name):
-        return []
-    return [
-        f"Run {run.name} was recorded with another car, {run.vehicle}, than the one that follows"
-        f" it, {vehicle.name}; leave it out unless they are the same."
-    ]
 
 
 def require_motion(runs: Sequence[Run], compared: Sequence[ComparedRun]) -> None:

@@ -20,6 +20,7 @@ from ..channels import WHEEL_CHANNELS
 from ..errors import ProblemError
 from ..simulation.initial_state import swings_in
 from ..simulation.simulate import rims_batch
+from .cars import mixed_plants
 from .compared_runs import ComparedRun
 from .estimates import estimates
 from .fit import (
@@ -147,6 +148,7 @@ def identify(
         judged = verdict(parameters, errors, vehicle, released)
     warnings = [
         *(warning for seen in problem.runs for warning in seen.warnings),
+        *mixed_plants({seen.name: seen.plant for seen in problem.runs}),
         *moved,
         *faults,
     ]

@@ -1,7 +1,6 @@
 """Measurement files under a mapping: from a path or from bytes to a Run."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 from ..errors import MeasurementError
@@ -31,7 +30,7 @@ def read_recording(
     try:
         with opened(path, path.name) as table:
             run = mapped_run(table, mapping, {**notes.noise, **(noise or {})}, notes.description)
-            return replace(run, vehicle=notes.vehicle or run.vehicle)
+            return notes.of_car(run)
     except OSError as error:
         raise _unreadable(path, error) from error
 
@@ -70,7 +69,7 @@ def mapped_run(
         noise={**said.noise, **noise},
         description=description or said.description,
     )
-    return replace(run, vehicle=said.vehicle)
+    return said.of_car(run)
 
 
 def _unreadable(path: Path, error: OSError) -> MeasurementError:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import Cancelled
-from ..identification.compared_runs import another_car
+from ..identification.cars import among_others, another_car
 from ..identification.kept_fit import KeptFit
 from ..manoeuvre import Manoeuvre
 from ..roads.road_spectrum import RoadSpectrum, road_spectra
@@ -75,6 +75,7 @@ def validate(
     driver = Driver(vehicle, traction, settings, fit)
     names = check_cases(cases)
     total = sum(len(kinds(case)) for case in cases)
+    plants = {name: case.run.plant for name, case in zip(names, cases, strict=True)}
     done, runs = 0, []
     for case, name in zip(cases, names, strict=True):
         case = replace(case, run=replace(case.run, name=name))
@@ -94,7 +95,7 @@ def validate(
                 role=case.role,
                 measured=measured,
                 findings=(
-                    *another_car(case.run, vehicle),
+                    *(another_car(case.run, vehicle) or among_others(name, plants)),
                     *dict.fromkeys(fault for one in found for fault in one.faults),
                 ),
                 manoeuvre=case.manoeuvre,

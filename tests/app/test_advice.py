@@ -54,6 +54,22 @@ def test_advice_after_an_identification(engineer):
     assert (refused.status_code, refused.json()["field"]) == (422, "vehicle")
 
 
+def test_what_needs_a_recording_that_was_deleted_names_it(engineer):
+    """Advice, a profile and a validation hold the fitted car against what it was fitted to."""
+    file = SAMPLES / "twin/manoeuvre_2.csv"
+    run = engineer.upload(file.read_bytes(), "monday.csv").json()["id"]
+    asked = {"runs": [run], "vehicle": PAPER, "free": ["K_F", "K_R"]}
+    job = engineer.post("/identifications", json=asked).json()["id"]
+    engineer.wait_for("identifications", job)
+    assert engineer.delete(f"/measurements/{run}").status_code == 204
+    some = {"candidates": ["brake-54"]}
+    for kind, more in (("advice", some), ("profiles", {"parameter": "K_F"}), ("validations", {})):
+        refused = engineer.post(f"/{kind}", json={"identification": job, **more})
+        assert (refused.status_code, refused.json()["code"]) == (410, "deleted")
+        said = "monday.csv, to which this car was fitted, was deleted; add it again and fit anew."
+        assert refused.json()["detail"] == said
+
+
 def test_a_fit_to_a_turned_channel_gives_no_advice(engineer):
     """Oracle: the fit's own words."""
     lines = (SAMPLES / "twin/manoeuvre_2.csv").read_bytes()

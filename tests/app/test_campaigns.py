@@ -144,6 +144,7 @@ def test_recordings_become_measurements_once(engineer, done):
     taken = reply.json()
     assert [one["name"] for one in taken] == ["manoeuvre_bump.csv", "manoeuvre_brake-54.csv"]
     assert all(one["noise"] == NOISE and one["usable_for_identification"] for one in taken)
+    assert {(one["vehicle"], one["plant"]) for one in taken} == {(CAR.name, "concept")}
     original = engineer.get(f"/measurements/{taken[0]['id']}/original")
     assert original.text == text(engineer, done, "manoeuvre_bump.csv")
     assert engineer.post(f"/campaigns/{done['id']}/measurements").json() == taken

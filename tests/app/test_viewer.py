@@ -6,7 +6,7 @@ import pytest
 from ridetune.app import viewer
 from ridetune.app.viewer import Viewers
 from ridetune.engine.vehicle_file import reference_vehicles
-from starlette.websockets import WebSocketDisconnect
+from starlette.websockets import WebSocket, WebSocketDisconnect
 from viser import __version__ as viser_version
 from viser import _messages as messages
 
@@ -93,6 +93,32 @@ def test_a_client_of_another_version_is_told_so(client, visitor):
     ):
         socket.receive_bytes()
     assert refused.value.code == 1002
+
+
+@pytest.mark.parametrize("token", ["its own", "wrong"])
+def test_a_tab_that_is_gone_before_it_is_answered_is_no_error(client, visitor, token):
+    """As in a page that is loaded again; the server says so by an OSError on whatever is sent."""
+    bearer = visitor.token if token == "its own" else token
+    scope = {
+        "type": "websocket",
+        "app": client.app,
+        "path": f"/s/{visitor.id}/viewer",
+        "query_string": b"",
+        "headers": [(b"authorization", f"Bearer {bearer}".encode())],
+        "subprotocols": [PROTOCOL],
+    }
+    sent = []
+
+    async def receive():
+        return {"type": "websocket.connect"}
+
+    async def send(message):
+        sent.append(message["type"])
+        raise OSError
+
+    client.portal.call(viewer.relay, WebSocket(scope, receive, send), visitor.id)
+    assert sent == [*(["websocket.accept"] if token == "its own" else []), "websocket.close"]
+    assert client.app.state.services.viewers.start(visitor.id).watchers == 0
 
 
 def test_each_session_has_a_viewer_of_its_own(viewers, car):

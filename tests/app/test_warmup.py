@@ -11,7 +11,7 @@ from ridetune.app.warmup import WarmUp
 
 def test_work_waits_until_the_kernels_are_there():
     warmup = WarmUp(lambda warmup: warmup.tell("Compiling a wheel."))
-    with pytest.raises(Compiling, match="first start") as refused:
+    with pytest.raises(Compiling, match="^Loading the compiled") as refused:
         warmup.require()
     assert refused.value.headers == {"Retry-After": "1"}
     warmup.start()
@@ -33,13 +33,16 @@ def test_a_failure_is_told_and_logged(caplog):
 
 
 def test_a_cold_cache_is_filled_by_other_processes(monkeypatch):
-    """What they have done is told; afterwards the cache holds the kernels."""
+    """That it takes long and what is done are told; afterwards the cache holds the kernels."""
     told: list[str] = []
     warmup = WarmUp(lambda warmup: warmup.compile_apart())
     monkeypatch.setattr(warmup, "tell", told.append)
     warmup.start()
     assert warmup.wait() is True
-    assert [message.split(": ")[1] for message in told] == ["0 of 2 parts.", "1 of 2 parts."]
+    *done, last = told
+    assert [message.split(": ")[1] for message in done] == ["0 of 2 parts.", "1 of 2 parts."]
+    assert all(message.startswith("Compiling the model; the first start") for message in done)
+    assert last.startswith("Loading the compiled")
     assert is_compiled()
 
 

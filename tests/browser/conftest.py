@@ -135,9 +135,9 @@ class Visitor:
             assert time.monotonic() < end, f"not within {seconds:g} s: {what}"
             self.page.wait_for_timeout(50)
 
-    def element(self, selector: str) -> Locator:
-        """An element by its selector."""
-        return self.page.locator(selector)
+    def element(self, selector: str, *, has_text: str | None = None) -> Locator:
+        """An element by its selector, of those with a text in them."""
+        return self.page.locator(selector, has_text=has_text)
 
     def click(self, selector: str) -> None:
         """Click an element."""

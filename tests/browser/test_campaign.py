@@ -58,6 +58,33 @@ def test_the_recordings_of_a_campaign_become_measurements(driver):
     driver.wait(lambda: driver.element("#take-over").count() == 0, "all are there")
 
 
+def test_a_run_that_came_in_is_fitted_too_at_a_press(driver):
+    """Those of the car that is fitted: the sample was driven by another, which its notes name."""
+    page = driver.page
+    fits = driver.element("#identify")
+
+    def drive(key, count):
+        for other in ("1", "2", "bump", "brake-54"):
+            page.set_checked(BOX.format(other), other == key)
+        driver.click("#drive")
+        driver.until(f"ridetune.state('measurements').length === {count}", DRIVEN)
+        driver.wait(lambda: driver.element("#drive").count() == 1, "the form is free again")
+
+    assert "The car on the sliders, “" in driver.element("#campaign-driver").inner_text()
+    drive("bump", 3)
+    notice = driver.element(".notice", has_text="recording is in")
+    assert "another car than that of detailed_manoeuvre_1.csv" in notice.inner_text()
+    assert notice.get_by_role("button", name="Fit it too").count() == 0
+    page.locator(".pick button", has_text="manoeuvre_bump").click()
+    assert "Driven by the concept car" in driver.element(".measurement-detail").inner_text()
+    page.get_by_role("button", name="Use as ride").click()
+    drive("brake-54", 4)
+    assert fits.get_attribute("title").startswith("Fits manoeuvre_bump.csv: ")
+    page.get_by_role("button", name="Fit it too").click()
+    both = "Fits manoeuvre_bump.csv, manoeuvre_brake-54.csv: "
+    assert fits.get_attribute("title").startswith(both)
+
+
 @pytest.fixture
 def unfolded(driver):
     """With what is rarely used in sight, and the constant speed on a random road chosen."""
@@ -148,7 +175,7 @@ def test_the_detailed_car_drives_and_becomes_the_session_s_car(driver):
     driver.click("#tab-measurements")
     page.route("**/campaigns", cut)
     page.uncheck(BOX.format("2"))
-    page.select_option("#campaign-plant", "detailed")
+    page.select_option("#campaign-car", "detailed")
     assert driver.element("#campaign-state").inner_text() == "1 drive, 20 s, about 50 s to compute"
     driver.click("#drive")
     driver.until("ridetune.state('measurements').length === 3", DRIVEN)
@@ -202,7 +229,7 @@ def test_a_car_that_cannot_drive_here_is_shown_with_the_reason(visit, service):
     visitor.page.route("**/api/plants", lacking)
     visitor.open(service.address).click("#tab-measurements")
     visitor.page.locator("summary", has_text="Drive a campaign").click()
-    option = visitor.element("#campaign-plant option[value=detailed]")
+    option = visitor.element("#campaign-car option[value=detailed]")
     assert (option.is_disabled(), option.inner_text()) == (True, "Detailed car: not installed")
     assert visitor.page.get_by_text(why).is_visible()
 

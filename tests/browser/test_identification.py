@@ -121,7 +121,15 @@ def test_an_uploaded_file_is_identified(visitor):
     visitor.until("ridetune.state('vehicle').name.includes('BMW')")
     visitor.click("#tab-identification")
     assert "but the sliders belong to “BMW 320i”" in visitor.element("#other-car").inner_text()
+    # The fit stays, of its own car, whatever comes in meanwhile.
+    visitor.click("#tab-measurements")
+    add_file(visitor, "another.csv", short_run(samples=600))
+    visitor.until("ridetune.state('measurements').length === 4")
     visitor.settled()
+    assert visitor.element("#measurements .problem").count() == 0
+    visitor.click("#tab-validation")
+    assert "“compact rear-drive car”, predicts" in visitor.element("#predicts").inner_text()
+    assert visitor.page.get_by_label("Hold out another.csv").count() == 1
 
 
 def test_an_identification_is_cancelled(visitor):

@@ -239,3 +239,19 @@ def test_what_a_bound_decides_is_not_marked_as_what_runs_determine(visitor, held
         assert well[2].endswith("if rear stabilizer bar stiffness is where its bound puts it")
     else:
         assert well == ["well", "determined yes", "well determined"]
+
+
+def test_a_view_that_fails_is_reported_and_nobody_else_s_affair(visitor):
+    """Whoever changes the state, and the other views, go on; the page's errors tell of it."""
+    visitor.expect("the view's own mistake")
+    seen = in_module(
+        visitor,
+        "store",
+        """const seen = [];
+        m.on("ofTheTest", () => { throw new Error("the view's own mistake"); });
+        m.on("ofTheTest", () => seen.push(m.get("ofTheTest")));
+        m.set({ ofTheTest: 1 });
+        return seen;""",
+    )
+    assert seen == [1]
+    visitor.wait(visitor.complaints.__len__, "the page's error")

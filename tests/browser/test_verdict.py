@@ -115,6 +115,28 @@ def test_a_fit_tells_what_its_run_determines_and_what_to_drive_next(analyst):
     assert chosen.count() == 1
     assert chosen.get_attribute("value") == best["key"]
     assert f"1 drive, {best['duration']:g} s" in visitor.element("#campaign-state").inner_text()
+    # What was advised of the fitted car is driven by it, though the sliders hold the start values.
+    assert "The fitted car, " in visitor.element("#campaign-driver").inner_text()
+    visitor.click("#drive")
+    visitor.until("ridetune.state('measurements').length === 4", 120)
+    assert visitor.look("ridetune.campaign().vehicle") == fit["vehicle"]
+    stiffness = "front.suspension.stiffness"
+    assert visitor.value(stiffness) != fit["vehicle"]["front"]["suspension"]["stiffness"]
+
+    # What the fit was made of is deleted: a further question names it, and is of no use again.
+    page.locator(".pick button", has_text="twin.csv").click()
+    visitor.element(".measurement-detail .danger").click()
+    visitor.element(".measurement-detail .danger").click()
+    visitor.until("ridetune.state('measurements').length === 3")
+    visitor.settled()
+    visitor.expect("410")
+    visitor.click("#tab-identification")
+    page.locator("#fit-parameters").click()
+    page.get_by_label("Profile of Rear spring stiffness").click()
+    problem = visitor.element("#identification .problem")
+    visitor.wait(lambda: problem.count() == 1, "a sentence")
+    assert problem.inner_text().startswith("twin.csv, to which this car was fitted, was deleted")
+    assert page.get_by_role("button", name="Try again").count() == 0
 
 
 def test_the_error_band_of_an_applied_fit_holds_its_curve_and_follows_no_other(analyst):
@@ -131,6 +153,19 @@ def test_the_error_band_of_an_applied_fit_holds_its_curve_and_follows_no_other(a
         assert np.nanmax(high - low) > 0.0
     visitor.click("#tab-comfort")
     assert "±" in visitor.element(".metrics:not(.fits) tbody").inner_text()
+
+    # However long it takes it stays wanted, also of another fit; until it is there it follows.
+    visitor.element("#slider-rear-suspension-stiffness").press("PageUp")
+    assert visitor.look("ridetune.state('bands')") is None
+    assert page.get_by_label("Error band").is_checked()
+    assert visitor.element("#band-word").inner_text() == "follows …"
+    visitor.until("ridetune.state('bands') !== null")
+    assert page.get_by_label("Error band").is_checked()
+    assert visitor.element("#band-word").inner_text() == "Error band"
+    first = visitor.look("ridetune.state('fitJob').id")
+    visitor.click("#identify")
+    visitor.until(f"ridetune.state('fitJob').id !== '{first}'", 150)
+    visitor.until("ridetune.state('bands') !== null")
 
     # A slider that moves takes the band away at once; wanted, it comes again when the slider rests.
     page.get_by_label("Error band").uncheck()

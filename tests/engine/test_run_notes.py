@@ -18,10 +18,12 @@ from ridetune.engine.toml_text import LARGEST_FILE
 
 def test_notes_state_noise_and_description():
     notes = parse_notes(
-        b'description = "Monday"\nvehicle = "Escort"\n[noise]\n"chassis.z" = 0.0005\n', "r.toml"
+        b'description = "Monday"\nvehicle = "Escort"\nplant = "detailed"\n'
+        b'[noise]\n"chassis.z" = 0.0005\n',
+        "r.toml",
     )
     assert notes.description == "Monday"
-    assert notes.vehicle == "Escort"
+    assert (notes.vehicle, notes.plant) == ("Escort", "detailed")
     assert notes.noise == {"chassis.z": 0.0005}
 
 
@@ -113,9 +115,9 @@ def test_what_conditioning_did_goes_into_notes_and_back():
         ("It drifts.",),
     )
     run = Run("r", [0.0, 1.0], {"chassis.z": [0.0, 1.0]}, {"chassis.z": 1e-4}, (), 'a "b"')
-    done = replace(run, conditioning=(record,) * 2, vehicle="Escort")
+    done = replace(run, conditioning=(record,) * 2, vehicle="Escort", plant="concept")
     notes = parse_notes(notes_of(done).encode(), "r.toml")
-    assert notes.vehicle == "Escort"
+    assert (notes.vehicle, notes.plant) == ("Escort", "concept")
     assert notes.conditioning == (record, record)
     assert (notes.noise, notes.description) == ({"chassis.z": 1e-4}, 'a "b"')
 

@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 from ridetune.engine.channels import OUTPUT_CHANNELS
 from ridetune.engine.errors import Cancelled, ManoeuvreError, ProblemError
+from ridetune.engine.identification.cars import mixed_plants
 from ridetune.engine.manoeuvre import reference_manoeuvres
 from ridetune.engine.measurement import read_run
 from ridetune.engine.run_notes import DEFAULT_NOISE
@@ -108,6 +109,16 @@ def test_a_turned_channel_and_another_car_are_told_beside_the_run():
     assert simulate_rims(PAPER, turned.run).faults == (fault,)
     assert "chassis.pitch of run manoeuvre_2.csv runs against the model" in fault
     assert prediction(wrong, "rims", "8dof").scores["chassis.pitch"].fit_percent < 0.0
+
+
+def test_a_run_of_another_plant_is_told_of_beside_it():
+    """The one that predicts is called the same: oracle, the sentence of a fit to both."""
+    measured = twin(2, "hold-out", known=False)
+    measured = replace(measured, run=replace(measured.run, plant=""))
+    first, second = validate(PAPER, [twin(1, known=False), measured]).runs
+    assert first.findings == ()
+    plants = {"manoeuvre_1.csv": "concept", "manoeuvre_2.csv": ""}
+    assert second.findings == tuple(mixed_plants(plants))
 
 
 def test_without_a_manoeuvre_there_are_only_the_rims():
