@@ -105,7 +105,7 @@ def test_a_job_keeps_the_steps_that_it_was_given(visitor, kept, client):
     visitor.put(address(kept), json={"steps": []})
     now = services.store.measurement(visitor.id, kept["id"])
     assert services.recordings.run(now).conditioning == ()
-    then = services.recordings.run(as_stated(now, told))
+    then = services.recordings.run(as_stated(services.store, visitor.id, told))
     assert [record.step for record in then.conditioning] == steps
     refused = visitor.post("/identifications", json={"runs": [kept["id"]]})
     assert "has none of chassis.z, chassis.pitch, chassis.roll" in refused.json()["detail"]

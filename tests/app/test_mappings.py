@@ -235,8 +235,7 @@ def test_a_job_reads_a_recording_as_it_was_mapped_then(visitor, kept):
     mapped = shared.store.measurement(visitor.id, kept["id"])
     run = shared.recordings.run(mapped)
     assert visitor.delete(f"{path}/mapping").json()["needs_mapping"] is True
-    now = shared.store.measurement(visitor.id, kept["id"])
-    again = shared.recordings.run(as_stated(now, stated(mapped)))
+    again = shared.recordings.run(as_stated(shared.store, visitor.id, stated(mapped)))
     np.testing.assert_array_equal(again["chassis.z"], run["chassis.z"])
 
 
