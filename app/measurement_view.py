@@ -65,7 +65,10 @@ def data_keys(of_session: Sequence[Measurement]) -> dict[str, str]:
 
 
 def _first_of_same_data(kept: Measurement, of_session: Sequence[Measurement]) -> Measurement | None:
-    """The oldest recording with the same data, unless it is this one."""
+    """The oldest recording with the same data, unless it is this one, or this one has been deleted
+    meanwhile."""
     keys = data_keys(of_session)
+    if kept.id not in keys:
+        return None
     first = next(one for one in of_session if keys[one.id] == keys[kept.id])
     return None if first.id == kept.id else first

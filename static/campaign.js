@@ -5,6 +5,7 @@ import * as form from "./campaign_form.js";
 import { take } from "./car.js";
 import { fold, h, inPlace } from "./dom.js";
 import { jobs } from "./job.js";
+import { deleted } from "./measurements.js";
 import { nameOf, ofAnotherPlant } from "./names.js";
 import { notice, refused } from "./notices.js";
 import { fitToo, fitted } from "./setup.js";
@@ -71,6 +72,7 @@ function absent() {
 
 async function takeOver() {
   try {
+    await deleted(); // else the service may count a recording in that is about to go
     const rows = await api.takeOver(current().id);
     const held = new Set(get("measurements").map(({ id }) => id));
     const added = rows.filter(({ id }) => !held.has(id));

@@ -357,6 +357,10 @@ async function preview(row, name, drawing, facts) {
   fitWidth(plot, drawing);
 }
 
+let deleting = Promise.resolve();
+/** Once the service has deleted what the page has let go of. */
+export const deleted = () => deleting;
+
 /** Deleting asks once, in place. */
 async function remove(row, event) {
   const button = event.currentTarget;
@@ -369,6 +373,11 @@ async function remove(row, event) {
   // The page lets go of the file first: nothing may still be asking for it when it is deleted.
   set({ measurements: get("measurements").filter(({ id }) => id !== row.id) });
   ($(".pick [aria-pressed=true]", parts.list) ?? $("#upload")).focus();
+  deleting = letGo(row);
+  await deleting;
+}
+
+async function letGo(row) {
   await looking;
   await settled();
   try {

@@ -7,6 +7,7 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
+from ridetune.app.measurement_view import measurement_to_json
 from ridetune.engine.manoeuvre import manoeuvre_to_json, reference_manoeuvres
 from scipy.io import savemat
 
@@ -86,6 +87,16 @@ def test_the_same_bytes_under_another_mapping_are_other_data(visitor):
     assert visitor.get(f"/measurements/{third['id']}").json()["same_data_as"] == first["id"]
     height["sign"] = 1
     assert visitor.put(f"{path}/mapping", json=mapping).json()["same_data_as"] == first["id"]
+
+
+def test_what_was_deleted_meanwhile_is_shown_as_it_was(visitor):
+    """Between reading it and looking at its session another request may delete it."""
+    kept = visitor.upload(short_recording()).json()
+    store = visitor.client.app.state.services.store
+    before = store.measurement(visitor.id, kept["id"])
+    visitor.delete(f"/measurements/{kept['id']}")
+    shown = measurement_to_json(store, visitor.id, before)
+    assert (shown["id"], shown["same_data_as"]) == (kept["id"], None)
 
 
 def test_a_bare_body_is_an_upload_too(visitor):
