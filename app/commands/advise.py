@@ -7,22 +7,21 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from ...engine.errors import VehicleError
 from ...engine.identification.advice_file import advisory_to_json
 from ...engine.identification.advisor import Advisory, advise_unmeasured, require_sound
 from ...engine.identification.advisor import advise as advise_after
 from ...engine.identification.candidates import catalogue
 from ...engine.identification.fit_file import fit_to_json
 from ...engine.identification.identify import identify
-from ...engine.identification.kept_fit import fit_from_json, is_fit
+from ...engine.identification.kept_fit import fit_from_json
 from ...engine.identification.problem import Problem
-from ...engine.json_text import read_json
 from ...engine.manoeuvre import Manoeuvre
 from ...engine.parameters import parameter
 from .inputs import (
     find_manoeuvre,
     find_mappings,
     find_vehicle,
+    fit_data,
     mapping_files,
     read_noise,
     read_runs,
@@ -65,8 +64,8 @@ def _key(name: str) -> str:
 def _problem(options: Namespace, noise: Mapping[str, float]) -> Problem:
     """The problem of the runs at fitted values: those of a fit's file, else fitted now."""
     runs = read_runs(options.runs, (), find_mappings(options.mapping, options.runs), noise=noise)
-    data = read_json(Path(options.vehicle), VehicleError) if _is_json(options.vehicle) else None
-    if not is_fit(data):
+    data = fit_data(options.vehicle)
+    if data is None:
         problem = Problem.build(find_vehicle(options.vehicle), runs)
         fitted = fit_to_json(identify(problem))
         print(fitted["outcome"])
@@ -89,16 +88,12 @@ def _problem(options: Namespace, noise: Mapping[str, float]) -> Problem:
 
 def _without_runs(vehicle: str) -> str:
     """What is known where no run is given, of a car or of a fit."""
-    if _is_json(vehicle) and is_fit(read_json(Path(vehicle), VehicleError)):
+    if fit_data(vehicle) is not None:
         return (
             f"What {Path(vehicle).name} knows counts only together with its runs: give them as RUN;"
             " without them, nothing is known but what is planned."
         )
     return "Without recordings, nothing is known but what is planned."
-
-
-def _is_json(name: str) -> bool:
-    return Path(name).is_file()
 
 
 def print_advisory(found: Advisory) -> None:

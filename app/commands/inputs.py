@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from ...engine.errors import (
     ManoeuvreError,
@@ -44,12 +44,20 @@ def find_vehicle(name: str) -> Vehicle:
     return _known(name, reference_vehicles(), VehicleError, "vehicle")
 
 
+def fit_data(name: str) -> Any:
+    """The JSON of the fit that a vehicle's file is; None of another, and of a pipe, which can be
+    read but once.
+    """
+    data = read_json(Path(name), VehicleError) if Path(name).is_file() else None
+    return data if is_fit(data) else None
+
+
 def held_bounds(name: str) -> dict[str, tuple[float, float]]:
     """(lower, upper) of the parameters that ended at a bound of the fit which a vehicle is; nothing
     where it is none. Default bounds would follow such a start eightfold beyond, fit after fit.
     """
-    data = read_json(Path(name), VehicleError) if _is_file(name) else None
-    if not is_fit(data):
+    data = fit_data(name)
+    if data is None:
         return {}
     fit = fit_from_json(data, Path(name).name)
     at_bound = {one["name"] for one in fit.ended["parameters"] if one.get("at_bound")}

@@ -1,7 +1,9 @@
 """`ridetune identify`: what it prints, writes and refuses."""
 
 import json
+import os
 import re
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +12,12 @@ from ridetune.app.cli import main
 from ridetune.engine.measurement import read_run, write_run
 from ridetune.engine.parameters import PARAMETER_NAMES
 from ridetune.engine.run import Run
-from ridetune.engine.vehicle_file import read_vehicle, reference_vehicles, write_vehicle
+from ridetune.engine.vehicle_file import (
+    read_vehicle,
+    reference_vehicles,
+    vehicle_to_json,
+    write_vehicle,
+)
 
 from .command_line import RECORDED, refused
 
@@ -323,3 +330,13 @@ def test_only_what_is_free_is_profiled(capsys):
         capsys, "identify", str(TWIN), *["--vehicle", "paper", "--free", "K_F", "--profile", "d_F"]
     )
     assert "front.pivot.distance was not free in this fit; free are" in message
+
+
+def test_a_car_may_come_by_a_pipe(folder, driven, capsys):
+    """Which can be read but once: whoever opened it again would wait for ever."""
+    os.mkfifo("car.json")
+    text = json.dumps(vehicle_to_json(reference_vehicles()["paper"]))
+    writer = threading.Thread(target=Path("car.json").write_text, args=[text], daemon=True)
+    writer.start()
+    assert main(["identify", str(driven), "--vehicle", "car.json", "--free", "K_F"]) == 0
+    assert "front.suspension.stiffness" in capsys.readouterr().out
