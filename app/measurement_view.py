@@ -7,19 +7,31 @@ from typing import Any
 from .store import Measurement, Store
 
 
-def measurements_to_json(store: Store, sid: str) -> list[dict[str, Any]]:
-    """All of a session, oldest first."""
-    kept = store.measurements(sid)
-    return [_shown(one, kept) for one in kept]
+def measurements_to_json(
+    store: Store, sid: str, kept: Sequence[Measurement] | None = None
+) -> list[dict[str, Any]]:
+    """Those of a session that are told, or all, oldest first."""
+    of_session = store.measurements(sid)
+    keys = data_keys(of_session)
+    oldest: dict[str, Measurement] = {}
+    for one in of_session:
+        oldest.setdefault(keys[one.id], one)
+    # One that was deleted meanwhile has no key.
+    return [
+        _shown(one, oldest[keys[one.id]] if one.id in keys else one)
+        for one in (of_session if kept is None else kept)
+    ]
 
 
 def measurement_to_json(store: Store, sid: str, kept: Measurement) -> dict[str, Any]:
     """One of a session."""
-    return _shown(kept, store.measurements(sid))
+    [shown] = measurements_to_json(store, sid, [kept])
+    return shown
 
 
-def _shown(kept: Measurement, of_session: Sequence[Measurement]) -> dict[str, Any]:
-    first = _first_of_same_data(kept, of_session)
+def _shown(kept: Measurement, oldest: Measurement) -> dict[str, Any]:
+    """A measurement beside the oldest with the same data, which may be itself."""
+    first = None if oldest.id == kept.id else oldest
     remarks = []
     if first is not None:
         remarks.append(
@@ -62,13 +74,3 @@ def data_keys(of_session: Sequence[Measurement]) -> dict[str, str]:
         one.id: one.summary.get("data_sha256") or by_bytes.get(one.sha256, one.sha256)
         for one in of_session
     }
-
-
-def _first_of_same_data(kept: Measurement, of_session: Sequence[Measurement]) -> Measurement | None:
-    """The oldest recording with the same data, unless it is this one, or this one has been deleted
-    meanwhile."""
-    keys = data_keys(of_session)
-    if kept.id not in keys:
-        return None
-    first = next(one for one in of_session if keys[one.id] == keys[kept.id])
-    return None if first.id == kept.id else first

@@ -16,7 +16,7 @@ from .errors import Conflict, NotFound
 from .job_routes import View, job_router, submitted
 from .job_store import Job
 from .jobs import as_asked
-from .measurement_view import measurement_to_json
+from .measurement_view import measurements_to_json
 from .schemas import CampaignRequest
 from .services import Services, Shared
 from .store import Measurement, NewMeasurement
@@ -94,7 +94,7 @@ def archive(sid: SessionId, jid: str, services: Shared) -> FileResponse:
 async def take_over(sid: SessionId, jid: str, services: Shared) -> list[dict[str, Any]]:
     """Make the whole recordings the session's measurements, those that it does not hold yet."""
     kept = await services.readers.run(sid, lambda: _taken(services, sid, jid))
-    return [measurement_to_json(services.store, sid, one) for one in kept]
+    return measurements_to_json(services.store, sid, kept)
 
 
 def _taken(services: Services, sid: str, jid: str) -> list[Measurement]:
