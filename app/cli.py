@@ -10,7 +10,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
 from typing import Any, NoReturn
@@ -94,6 +94,18 @@ def command_line() -> Parser:
     return parser
 
 
+def _compiling(run: Callable[[argparse.Namespace], None]) -> Callable[[argparse.Namespace], None]:
+    """A command that tells when it compiles kernels, which takes a while."""
+
+    def told(options: argparse.Namespace) -> None:
+        from .compile import compiling_told
+
+        with compiling_told():
+            run(options)
+
+    return told
+
+
 def _serve(options: argparse.Namespace) -> None:
     from .serve import serve
     from .settings import Settings
@@ -101,12 +113,11 @@ def _serve(options: argparse.Namespace) -> None:
     serve(Settings.from_environment(host=options.host, port=options.port, data=options.data))
 
 
+@_compiling
 def _simulate(options: argparse.Namespace) -> None:
     from .commands.simulate import simulate
-    from .compile import compiling_told
 
-    with compiling_told():
-        simulate(options)
+    simulate(options)
 
 
 def _channels(options: argparse.Namespace) -> None:
@@ -115,12 +126,11 @@ def _channels(options: argparse.Namespace) -> None:
     channels(options)
 
 
+@_compiling
 def _sweep(options: argparse.Namespace) -> None:
     from .commands.sweep import sweep
-    from .compile import compiling_told
 
-    with compiling_told():
-        sweep(options)
+    sweep(options)
 
 
 def _condition(options: argparse.Namespace) -> None:
@@ -129,36 +139,32 @@ def _condition(options: argparse.Namespace) -> None:
     condition(options)
 
 
+@_compiling
 def _identify(options: argparse.Namespace) -> None:
     from .commands.identify import identify
-    from .compile import compiling_told
 
-    with compiling_told():
-        identify(options)
+    identify(options)
 
 
+@_compiling
 def _validate(options: argparse.Namespace) -> None:
     from .commands.validate import validate
-    from .compile import compiling_told
 
-    with compiling_told():
-        validate(options)
+    validate(options)
 
 
+@_compiling
 def _advise(options: argparse.Namespace) -> None:
     from .commands.advise import advise
-    from .compile import compiling_told
 
-    with compiling_told():
-        advise(options)
+    advise(options)
 
 
+@_compiling
 def _campaign(options: argparse.Namespace) -> None:
     from .commands.campaign import campaign
-    from .compile import compiling_told
 
-    with compiling_told():
-        campaign(options)
+    campaign(options)
 
 
 def _bench(options: argparse.Namespace) -> None:
