@@ -35,7 +35,7 @@ def estimates(
         value = one.value(variable)
         at_bound = one.at_bound(value)
         below = above = errors.quantile * deviation
-        if at_bound and variable < 0.5 * sum(one.ends):
+        if at_bound and one.end_near(variable) < 0:
             below, above = math.inf, max(0.0, further - variable + above)
         elif at_bound:
             below, above = max(0.0, variable - further + below), math.inf

@@ -310,7 +310,7 @@ def _released(found: Found, estimates: Sequence[Estimate], problem: Problem) -> 
     sides = np.zeros(len(estimates), dtype=np.int64)
     for k, (one, free) in enumerate(zip(estimates, problem.variables, strict=True)):
         if one.at_bound:
-            sides[k] = 1 if found.x[k] > 0.5 * sum(free.ends) else -1
+            sides[k] = free.end_near(found.x[k])
     steps = found.released(sides)
     return {estimates[k].title: step[: len(problem.free)] for k, step in steps.items()}
 

@@ -220,7 +220,7 @@ class _Tour:
         for one, slope in zip(rest, self._slope[: len(rest)].tolist(), strict=True):
             value, before = end.others[one.name], self.centre.others[one.name]
             first, last = one.ends
-            outwards = slope * way if one.variable(value) > 0.5 * (first + last) else -slope * way
+            outwards = slope * way * one.end_near(one.variable(value))
             driven = outwards > AT_BOUND * (last - first)
             if one.at_bound(value) and (driven or not one.at_bound(before)):
                 found.append(one.name)

@@ -59,6 +59,10 @@ class Variable:
         low, high = sorted((self.variable(self.lower), self.variable(self.upper)))
         return low, high
 
+    def end_near(self, variable: float) -> int:
+        """Which end of the variable's range is nearer to it: -1 the lower one, 1 the upper one."""
+        return 1 if variable > 0.5 * sum(self.ends) else -1
+
     def at_bound(self, value: float) -> bool:
         """Whether a value is at one of its bounds."""
         return self._is_at(self.lower, value) or self._is_at(self.upper, value)
