@@ -46,7 +46,10 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a sweep has come: cars simulated, of how many, failed, and since when, s."""
+    """How far a sweep has come: cars simulated, of how many, failed, and since when, s.
+
+    Of a share of a sweep, all of that share.
+    """
 
     cars: int
     of: int
@@ -70,23 +73,29 @@ def sweep(
     design: Design,
     excitation: Excitation,
     *,
+    cars: range | None = None,
     threads: int | None = None,
     progress: Callable[[Progress], object] | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> Iterator[Block]:
-    """Rows of all cars of a design, in the order of their numbers.
+    """Rows of the cars of a design, in the order of their numbers.
 
     vehicle : the car whose numbers the design replaces
+    cars : a share of the sweep as numbers in a row, whose figures are those of the whole; all
+        without
     threads : as many as there are cores without
     progress : told at least every few cars how far the sweep is
     cancelled : asked as often; Cancelled is raised once it says so
 
-    Raises at once what is wrong with the sweep as a whole, see `check_sweep`.
+    Raises at once what is wrong with the sweep as a whole, see `check_sweep`; a share is taken to
+    be one of a sweep that was checked.
     """
     threads = threads_of(threads)
-    check_sweep(vehicle, design, excitation, threads)
+    if cars is None:
+        check_sweep(vehicle, design, excitation, threads)
     excitation = stepped_alike(vehicle, design, excitation)
-    return _blocks(vehicle, design, excitation, threads, progress, cancelled)
+    swept = range(design.cars) if cars is None else cars
+    return _blocks(vehicle, design, excitation, swept, threads, progress, cancelled)
 
 
 def car_of(vehicle: Vehicle, design: Design, number: int) -> Vehicle:
@@ -98,32 +107,34 @@ def _blocks(
     vehicle: Vehicle,
     design: Design,
     excitation: Excitation,
+    cars: range,
     threads: int,
     progress: Callable[[Progress], object] | None,
     cancelled: Callable[[], bool] | None,
 ) -> Iterator[Block]:
-    began, done, failed = time.perf_counter(), 0, 0
+    began, failed = time.perf_counter(), 0
     part, together = FIRST_PART * threads, side_by_side(excitation, typical_cars(vehicle, design))
-    while done < design.cars:
-        first, values = done, design.block(done, BLOCK)
-        parts = []
-        while done < first + len(values):
+    for first in range(cars.start, cars.stop, BLOCK):
+        values = design.block(first, min(BLOCK, cars.stop - first))
+        at, parts = 0, []
+        while at < len(values):
+            done = first - cars.start + at
             if cancelled is not None and cancelled():
-                raise Cancelled(f"The sweep was cancelled after {done} of {design.cars} cars.")
-            started = time.perf_counter()
-            some = values[done - first : done - first + part]
+                raise Cancelled(f"The sweep was cancelled after {done} of {len(cars)} cars.")
+            started, some = time.perf_counter(), values[at : at + part]
             if together is None:
                 parts.append(_one_by_one(vehicle, design, some, excitation, threads))
             else:
                 parts.append(_together(vehicle, design, some, excitation, together, threads))
-            done += len(some)
+            at += len(some)
             failed += int(np.sum(parts[-1]["status"] != OK))
             taken = time.perf_counter() - started
             part = int(np.clip(len(some) * LOOK_EVERY / taken, threads, BLOCK))
             if progress is not None:
-                progress(Progress(done, design.cars, failed, time.perf_counter() - began))
+                seconds = time.perf_counter() - began
+                progress(Progress(done + len(some), len(cars), failed, seconds))
         yield {
-            "car": np.arange(first, done),
+            "car": np.arange(first, first + len(values)),
             **dict(zip(design.names, values.T, strict=True)),
             **{name: np.concatenate([rows[name] for rows in parts]) for name in parts[0]},
         }

@@ -90,6 +90,21 @@ def test_each_row_is_its_car_simulated_alone(case, ranges):
         assert_figures(has_found, run, car, SHARP)
 
 
+@pytest.mark.parametrize("ranges", [SPRINGS, RANGES], ids=["side by side", "one by one"])
+def test_shares_of_a_sweep_are_the_sweep(ranges, monkeypatch):
+    """Oracle: all cars at once, bit for bit; shares of other lengths than the blocks."""
+    monkeypatch.setattr(module, "BLOCK", 4)
+    design, told = Sobol(ranges, 11, seed=2), []
+    whole = rows(CAR, design, FreeExcitation(BUMP))
+    shares = [
+        rows(CAR, design, FreeExcitation(BUMP), cars=cars, progress=told.append)
+        for cars in (range(0, 3), range(3, 9), range(9, 11))
+    ]
+    for name, values in whole.items():
+        assert_array_equal(np.concatenate([share[name] for share in shares]), values)
+    assert [(one.cars, one.of) for one in told if one.cars == one.of] == [(3, 3), (6, 6), (2, 2)]
+
+
 @pytest.mark.parametrize("other", [{}, {"chassis.mass": [900.0, 1300.0]}], ids=["alike", "not"])
 def test_all_cars_of_a_sweep_take_the_step_that_its_bent_ones_need(other):
     """Oracle: the same sweep with that step told."""
