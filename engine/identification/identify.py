@@ -9,7 +9,7 @@ tells what the paper's campaign can and cannot determine.
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,6 +22,7 @@ from ..simulation.initial_state import swings_in
 from ..simulation.simulate import rims_batch
 from .cars import mixed_plants
 from .compared_runs import ComparedRun
+from .ended_search import EndedSearch
 from .estimates import estimates
 from .fit import (
     CONVERGED,
@@ -85,6 +86,8 @@ def identify(
     most_evaluations: int = MOST_EVALUATIONS,
     starts: int = 1,
     seed: int = 0,
+    ended: Mapping[int, EndedSearch] | None = None,
+    keep: Callable[[int, EndedSearch], object] = lambda number, search: None,
     simulate: Simulate = rims_batch,
 ) -> Fit:
     """Fit the problem's free parameters.
@@ -93,6 +96,8 @@ def identify(
     cancelled : polled throughout; Cancelled is raised within 0.2 s of its being true
     most_evaluations : trial points before a search gives up
     starts : points to try as starts, the told one and others spread over the bounds by `seed`
+    ended, keep : searches by number that the same fit made before it was broken off, and what is
+        told of each that ends: a fit that goes on gives what an undisturbed one gives
     simulate : the model, as a function of cars, inputs and traction
 
     A poor, undetermined or unfinished fit is a result and says so in its outcome and warnings.
@@ -114,7 +119,7 @@ def identify(
     others = spread(problem.of_car(lower), problem.of_car(upper), starts - 1, seed)
     of_sensors = x_start[len(problem.free) :]
     others = [np.concatenate([of_car, of_sensors]) for of_car in others]
-    reached = refined_starts(search, x_start, others, most_evaluations)
+    reached = refined_starts(search, x_start, others, most_evaluations, ended or {}, keep)
     if not doubted:
         reached = with_found_noise(search, reached, most_evaluations)
     told, residuals = problem.runs, search.residuals

@@ -8,10 +8,13 @@ already found promises its cost and its Newton step (`search.Found.holds`); it i
 and so told.
 """
 
+from collections.abc import Callable, Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from .ended_search import EndedSearch
 from .fit import Ending, Stage
 from .search import Found, Search
 
@@ -44,24 +47,47 @@ def spread(lower: Array, upper: Array, count: int, seed: int) -> list[Array]:
 
 
 def refined_starts(
-    search: Search, start: Array, others: list[Array], most_evaluations: int
+    search: Search,
+    start: Array,
+    others: list[Array],
+    most_evaluations: int,
+    ended: Mapping[int, EndedSearch],
+    keep: Callable[[int, EndedSearch], object],
 ) -> list[list[Found]]:
     """Distinct minima, the lowest first, each with all refinements that ended there, its own first.
 
     start : refined first and in any case;  others : points, of which the best are refined
+    ended : searches by number that need not be made again;  keep : told of each that was made
     """
     costs = search.screened(start, others, min(1 + len(others), REFINED))
     best = [k for k in np.argsort(costs, kind="stable")[: REFINED - 1] if np.isfinite(costs[k])]
     trials = [start, *(others[k] for k in best)]
     minima: list[list[Found]] = []
+    searched: list[Found] = []
     for k, trial in enumerate(trials):
         search.stage, search.turn = Stage.SEARCHING, (k + 1, len(trials))
-        known = [of[0] for of in minima if of[0].ending == Ending.CONVERGED]
-        found = (
-            search.explore(trial, most_evaluations, known)
-            if k
-            else search.refine(trial, most_evaluations)
-        )
+        if (before := ended.get(k)) is not None:
+            found = search.again(before, None if before.basin is None else searched[before.basin])
+        else:
+            known = [of[0] for of in minima if of[0].ending == Ending.CONVERGED]
+            simulations, evaluations = search.simulations, search.evaluations
+            found = (
+                search.explore(trial, most_evaluations, known)
+                if k
+                else search.refine(trial, most_evaluations)
+            )
+            basin = (j for j, one in enumerate(searched) if one is found.minimum)
+            keep(
+                k,
+                EndedSearch(
+                    tuple(found.x.tolist()),
+                    found.ending,
+                    next(basin, None),
+                    search.simulations - simulations,
+                    tuple(search.cost_history[evaluations:]),
+                ),
+            )
+        searched.append(found)
         place = next((of for of in minima if _ended_in(of, found)), None)
         if place is None:
             minima.append([found])

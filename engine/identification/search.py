@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from .condensed import condensed_jacobian, condensed_residuals
+from .ended_search import EndedSearch
 from .fit import Ending, Progress, Stage
 from .residuals import FAILED_TRIAL, Residuals
 from .uncertainty import DIRECTION_TOLERANCE
@@ -199,6 +200,23 @@ class Search:
     def refine(self, x: Array, most_evaluations: int) -> Found:
         """Search from x."""
         return self._run(x, most_evaluations)
+
+    def again(self, ended: EndedSearch, minimum: Found | None) -> Found:
+        """What a search found that has ended before, out of what is kept of it.
+
+        minimum : in whose basin it was cut short
+        """
+        x, spent = np.array(ended.x), self.residuals.simulations
+        quick = ended.ending == Ending.SAME_BASIN
+        self._slopes = self.residuals.quick(x)[1] if quick else self.residuals.jacobian(x)
+        found = self._found(x, ended.ending, minimum)
+        self._simulations_before += ended.simulations - (self.residuals.simulations - spent)
+        self.evaluations += len(ended.cost_history)
+        self.cost_history += ended.cost_history
+        if ended.cost_history[-1] < self._best_cost:
+            self._best, self._best_cost = (x, found.residuals), ended.cost_history[-1]
+        self._tell(*self._best, self._best_cost)
+        return found
 
     def _run(self, x: Array, most_evaluations: int) -> Found:
         self._began, self._failures = self.evaluations, 0

@@ -1,13 +1,15 @@
 """Many starts on a model of one parameter whose cost has several minima, known by a fine grid."""
 
+import json
 import threading
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from ridetune.engine.channels import INPUT_CHANNELS
 from ridetune.engine.errors import Cancelled, ProblemError
+from ridetune.engine.identification.ended_search import EndedSearch
 from ridetune.engine.identification.fit import Ending
 from ridetune.engine.identification.identify import Problem, identify
 from ridetune.engine.identification.multistart import REFINED, spread
@@ -99,6 +101,33 @@ def test_searches_cut_short_lie_in_the_basin_they_are_counted_in(monkeypatch):
     for one, other in zip(found.minima, whole.minima, strict=True):
         assert (one.cut_short < one.starts, other.cut_short) == (True, 0)
         assert one.starts == other.starts
+
+
+@pytest.mark.parametrize("before", [1, 3, REFINED])
+def test_a_fit_that_was_broken_off_goes_on_to_the_same_fit(before):
+    """Oracle: the undisturbed fit, bit for bit. What is kept goes through JSON; only the searches
+    that are missing are made."""
+    kept, made, told = {}, {}, []
+    whole = identify(asked(4.5), starts=64, simulate=simulate, keep=kept.__setitem__)
+    again = {k: EndedSearch.from_json(json.loads(json.dumps(kept[k].to_json()))) for k in kept}
+    again = {k: one for k, one in again.items() if k < before}
+    found = identify(
+        asked(4.5),
+        starts=64,
+        simulate=simulate,
+        ended=again,
+        keep=made.__setitem__,
+        progress=lambda now: told.append((now.search, now.evaluations, now.simulations)),
+    )
+    assert len(kept) == REFINED
+    assert any(one.basin is not None for one in kept.values())
+    assert made == {k: one for k, one in kept.items() if k >= before}
+    for one, other in zip(found.minima, whole.minima, strict=True):
+        assert one == other
+    assert_array_equal(found.errors.covariance, whole.errors.covariance)
+    for name in ("parameters", "cost_history", "evaluations", "simulations", "warnings"):
+        assert getattr(found, name) == getattr(whole, name)
+    assert told == sorted(told)
 
 
 def test_minima_that_are_one_with_the_noise_that_is_found_are_told_as_one():
