@@ -4,12 +4,24 @@ WAL with synchronous=FULL: what was answered survives a power cut. A writing tra
 write lock at its start (BEGIN IMMEDIATE), so it waits for its turn instead of failing half way.
 """
 
+import time
 from contextlib import AbstractContextManager
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Connection, create_engine, event, insert, inspect, select, update
+from sqlalchemy import (
+    ColumnElement,
+    Connection,
+    Float,
+    create_engine,
+    event,
+    insert,
+    inspect,
+    literal,
+    select,
+    update,
+)
 
 from .errors import StartError
 from .tables import MIGRATIONS, SCHEMA_VERSION, metadata, schema_version
@@ -41,6 +53,11 @@ class Database:
     def writing(self) -> AbstractContextManager[Connection]:
         """Transaction that commits durably at its end, or leaves no trace."""
         return self._writer.begin()
+
+    @property
+    def now(self) -> ColumnElement[float]:
+        """The time, in a statement, by the clock that all who use the database share."""
+        return literal(time.time(), Float)
 
     def close(self) -> None:
         """Close every connection."""

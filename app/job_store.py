@@ -1,30 +1,52 @@
 """Jobs as kept in the database: queued, running, done, failed or cancelled.
 
-`attempts` counts starts that ended in a lost worker, `restarts` counts starts that ended because
-the service itself stopped: a job must not fail for our restarts.
+An unfinished job is run by its owner, one service process, which renews its lease by a heartbeat;
+once the lease has run out another one may claim it. A job may thus be run twice, and the first end
+is the end.
+
+`attempts` counts starts that ended in a lost worker. `restarts` counts those that ended because the
+owner was lost: it crashed, or its lease ran out. What an owner hands over as it stops in good order
+counts as neither: a job must not fail for our restarts.
 """
 
 import json
 import secrets
-import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Connection, Row, delete, func, insert, select, update
+from sqlalchemy import (
+    ColumnElement,
+    Connection,
+    Row,
+    Select,
+    case,
+    delete,
+    func,
+    insert,
+    or_,
+    select,
+    update,
+)
 
 from .database import Database
 from .errors import Busy, InvalidRequest, NotFound
 from .settings import Limits
-from .tables import job_files, jobs, results, sessions
+from .tables import job_files, job_parts, jobs, results, sessions
 
 UNFINISHED = ("queued", "running")
+LEASE = 10.0
+"""How long a job stays its owner's after the last heartbeat, s."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """One background job; `spec` is everything needed to run it again, `file` the SHA-256 of what
-    it made.
+    """One background job.
+
+    spec : everything needed to run it again
+    owner : the service process that runs it
+    priority : a job with a higher one is claimed before others
+    file : SHA-256 of what it made
     """
 
     id: str
@@ -39,6 +61,9 @@ class Job:
     finished: float | None
     attempts: int
     restarts: int
+    owner: str | None
+    cancel_asked: bool
+    priority: int
     result: dict[str, Any] | None = None
     file: str | None = None
 
@@ -53,6 +78,14 @@ class Job:
         return [run["id"] for run in self.spec.get("runs", [])]
 
 
+@dataclass(frozen=True)
+class Beat:
+    """The ids of an owner's unfinished jobs, and of those among them that are to stop."""
+
+    jobs: frozenset[str]
+    cancel_asked: frozenset[str]
+
+
 class JobStore:
     """The jobs of all sessions."""
 
@@ -61,7 +94,13 @@ class JobStore:
         self._limits = limits
 
     def add(
-        self, session: str, kind: str, spec: Mapping[str, Any], key: str | None
+        self,
+        session: str,
+        kind: str,
+        spec: Mapping[str, Any],
+        key: str | None,
+        *,
+        priority: int = 0,
     ) -> tuple[Job, bool]:
         """Keep a queued job, or find the one kept under the caller's key; whether it is new.
 
@@ -92,7 +131,8 @@ class JobStore:
                     key=key,
                     state="queued",
                     spec=json.dumps(dict(spec)),
-                    created=time.time(),
+                    created=self._database.now,
+                    priority=priority,
                 )
             )
             connection.execute(update(sessions).where(sessions.c.id == session).values(used=True))
@@ -135,24 +175,89 @@ class JobStore:
             query = _select(*conditions).order_by(jobs.c.created)
             return [_job(row) for row in connection.execute(query)]
 
-    def requeue_all(self) -> None:
-        """Take back what ran when the service stopped."""
+    def claim(self, owner: str, most: int) -> list[Job]:
+        """Make unfinished jobs that nobody runs the owner's, `most` at once, those of the highest
+        priority first, then the oldest.
+
+        Whichever of them was asked to stop is cancelled instead.
+        """
         with self._database.writing() as connection:
+            now = self._database.now
+            # Also where a clock went back, the lease has run out.
+            lapsed = func.abs(jobs.c.heartbeat_at - now) > LEASE
+            free = jobs.c.state.in_(UNFINISHED) & or_(
+                jobs.c.owner.is_(None), (jobs.c.owner != owner) & lapsed
+            )
+            stopped = select(jobs.c.id).where(free, jobs.c.cancel_asked)
+            order = (jobs.c.priority.desc(), jobs.c.created, jobs.c.id)
+            waiting = select(jobs.c.id).where(free, ~jobs.c.cancel_asked).order_by(*order)
+            self._cancel(connection, _locked(connection, stopped))
+            taken = _locked(connection, waiting.limit(most))
+            _take_back(connection, jobs.c.id.in_(taken), owner=owner, heartbeat_at=now)
+            query = _select(jobs.c.id.in_(taken)).order_by(*order)
+            return [_job(row) for row in connection.execute(query)]
+
+    def heartbeat(self, owner: str) -> Beat:
+        """Renew the leases of an owner's jobs; which those still are."""
+        with self._database.writing() as connection:
+            # In one order, so that nobody who locks several of them waits in a circle.
+            held = select(jobs.c.id).where(_of(owner)).order_by(jobs.c.id).with_for_update()
+            mine = connection.execute(held).scalars().all()
+            renewed = connection.execute(
+                update(jobs)
+                .where(jobs.c.id.in_(mine))
+                .values(heartbeat_at=self._database.now)
+                .returning(jobs.c.id, jobs.c.cancel_asked)
+            ).all()
+        return Beat(
+            frozenset(row.id for row in renewed),
+            frozenset(row.id for row in renewed if row.cancel_asked),
+        )
+
+    def release(self, owner: str) -> None:
+        """Give up an owner's jobs, for the next one to claim."""
+        with self._database.writing() as connection:
+            held = select(jobs.c.id).where(_of(owner)).order_by(jobs.c.id).with_for_update()
+            mine = connection.execute(held).scalars().all()
+            asked = select(jobs.c.id).where(jobs.c.id.in_(mine), jobs.c.cancel_asked)
+            self._cancel(connection, connection.execute(asked).scalars().all())
             connection.execute(
                 update(jobs)
-                .where(jobs.c.state == "running")
-                .values(state="queued", started=None, restarts=jobs.c.restarts + 1)
+                .where(jobs.c.id.in_(mine), _of(owner))
+                .values(state="queued", started=None, owner=None)
             )
 
-    def start(self, job: str) -> bool:
-        """Mark a queued job as running; False if it is not queued any more."""
-        return self._move(job, ("queued",), state="running", started=time.time())
+    def take_back_all(self) -> None:
+        """Make every unfinished job claimable, where no other service can be running one."""
+        with self._database.writing() as connection:
+            _take_back(connection, jobs.c.owner.is_not(None), owner=None)
 
-    def requeue(self, job: str) -> bool:
-        """Take a job back whose worker was lost; False if it has ended meanwhile."""
+    def start(self, job: str, owner: str) -> bool:
+        """Mark its owner's queued job as running; False if it is not queued, or not its own, any
+        more.
+        """
+        return self._move(job, owner, ("queued",), state="running", started=self._database.now)
+
+    def requeue(self, job: str, owner: str) -> bool:
+        """Take a job back whose worker was lost, which stays its owner's; False if it has ended
+        meanwhile, or is another's.
+        """
         return self._move(
-            job, UNFINISHED, state="queued", started=None, attempts=jobs.c.attempts + 1
+            job, owner, UNFINISHED, state="queued", started=None, attempts=jobs.c.attempts + 1
         )
+
+    def ask_to_cancel(self, session: str, job: str) -> Job:
+        """Have a job's owner stop it; one that has no owner is cancelled at once."""
+        with self._database.writing() as connection:
+            mine = (jobs.c.session == session) & (jobs.c.id == job)
+            connection.execute(
+                update(jobs).where(mine, jobs.c.state.in_(UNFINISHED)).values(cancel_asked=True)
+            )
+            unowned = select(jobs.c.id).where(
+                mine, jobs.c.state.in_(UNFINISHED), jobs.c.owner.is_(None)
+            )
+            self._cancel(connection, connection.execute(unowned).scalars().all())
+        return self.get(session, job)
 
     def finish(
         self,
@@ -164,11 +269,12 @@ class JobStore:
         progress: Mapping[str, Any] | None = None,
         file: str | None = None,
     ) -> bool:
-        """Give a job its final state, with its result in the same commit; False if it had one.
+        """Give a job its final state, with its result in the same commit, in which its parts go;
+        False if it had one.
 
         file : SHA-256 of what it made, which is kept already
         """
-        values: dict[str, Any] = {"state": state, "finished": time.time()}
+        values: dict[str, Any] = {"state": state, "finished": self._database.now}
         if error is not None:
             values["error"] = json.dumps(dict(error))
         if progress is not None:
@@ -179,25 +285,53 @@ class JobStore:
             )
             if ended.rowcount and result is not None:
                 connection.execute(insert(results).values(job=job, body=json.dumps(dict(result))))
+            if ended.rowcount:
+                connection.execute(delete(job_parts).where(job_parts.c.job == job))
             if ended.rowcount and file is not None:
                 connection.execute(insert(job_files).values(job=job, sha256=file))
         return bool(ended.rowcount)
 
-    def save_progress(self, job: str, progress: Mapping[str, Any]) -> None:
-        """Keep how far a running job has come."""
-        self._move(job, UNFINISHED, progress=json.dumps(dict(progress)))
+    def save_progress(self, job: str, owner: str, progress: Mapping[str, Any]) -> None:
+        """Keep how far its owner's job has come."""
+        self._move(job, owner, UNFINISHED, progress=json.dumps(dict(progress)))
 
     def delete(self, session: str, job: str) -> None:
         """Remove a job and its result."""
         with self._database.writing() as connection:
             connection.execute(delete(jobs).where(jobs.c.session == session, jobs.c.id == job))
 
-    def _move(self, job: str, states: tuple[str, ...], **values: Any) -> bool:
+    def _move(self, job: str, owner: str, states: tuple[str, ...], **values: Any) -> bool:
         with self._database.writing() as connection:
             moved = connection.execute(
-                update(jobs).where(jobs.c.id == job, jobs.c.state.in_(states)).values(**values)
+                update(jobs)
+                .where(jobs.c.id == job, jobs.c.owner == owner, jobs.c.state.in_(states))
+                .values(**values)
             )
         return bool(moved.rowcount)
+
+    def _cancel(self, connection: Connection, chosen: Sequence[str]) -> None:
+        values = {"state": "cancelled", "finished": self._database.now}
+        connection.execute(update(jobs).where(jobs.c.id.in_(chosen)).values(**values))
+        connection.execute(delete(job_parts).where(job_parts.c.job.in_(chosen)))
+
+
+def _of(owner: str) -> ColumnElement[bool]:
+    return (jobs.c.owner == owner) & jobs.c.state.in_(UNFINISHED)
+
+
+def _locked(connection: Connection, chosen: Select[Any]) -> Sequence[str]:
+    """Ids that nobody else holds at the moment, held to the end of the transaction."""
+    return connection.execute(chosen.with_for_update(skip_locked=True)).scalars().all()
+
+
+def _take_back(connection: Connection, chosen: ColumnElement[bool], **values: Any) -> None:
+    """Queue unfinished jobs again; those that ran have lost their owner."""
+    lost = case((jobs.c.state == "running", 1), else_=0)
+    connection.execute(
+        update(jobs)
+        .where(chosen, jobs.c.state.in_(UNFINISHED))
+        .values(state="queued", started=None, restarts=jobs.c.restarts + lost, **values)
+    )
 
 
 def _select(*conditions: Any) -> Any:
@@ -234,6 +368,9 @@ def _job(row: Row[Any], result: str | None = None, file: str | None = None) -> J
         finished=row.finished,
         attempts=row.attempts,
         restarts=row.restarts,
+        owner=row.owner,
+        cancel_asked=row.cancel_asked,
+        priority=row.priority,
         result=json.loads(result) if result else None,
         file=file,
     )

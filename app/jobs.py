@@ -9,6 +9,7 @@ import contextlib
 import hashlib
 import json
 import logging
+import secrets
 import time
 from collections.abc import AsyncIterator, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -26,6 +27,7 @@ log = logging.getLogger(__name__)
 
 GRACE = 2.0
 MOST_ATTEMPTS = 3
+MOST_CLAIMED = 100
 SAVE_EVERY = 1.0
 
 
@@ -64,6 +66,7 @@ class Jobs:
     ):
         """Jobs are sent once `ready` returns, and only if it returns True."""
         self._store = store
+        self._owner = secrets.token_hex(8)
         self._ready = ready
         self._cluster = cluster
         self._kinds = kinds
@@ -81,9 +84,7 @@ class Jobs:
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
         """Take up what a former run of the service left unfinished."""
         self._loop = loop
-        self._store.jobs.requeue_all()
-        for job in self._store.jobs.unfinished():
-            self._sender.submit(self._send, job)
+        self._take_up()
 
     def close(self) -> None:
         """Stop; what is under way is taken up again by the next start."""
@@ -91,12 +92,13 @@ class Jobs:
             executor.shutdown(cancel_futures=True)
         self._cluster.close()
         self._recorder.shutdown()
+        self._store.jobs.release(self._owner)
 
     def submit(self, session: str, kind: str, spec: Mapping[str, Any], key: str | None) -> Job:
         """Keep a job durably, then send it off; the same key gives the same job."""
         job, new = self._store.jobs.add(session, kind, spec, key)
         if new:
-            self._sender.submit(self._send, job)
+            self._take_up()
         return job
 
     def known(self, session: str, key: str | None, asked: str) -> Job | None:
@@ -154,7 +156,7 @@ class Jobs:
 
     def task_started(self, task: str) -> None:
         """Mark the job as running."""
-        self._record(self._store.jobs.start, task)
+        self._record(self._store.jobs.start, task, self._owner)
 
     def task_progressed(self, task: str, progress: Mapping[str, Any]) -> None:
         """Remember how far it is; durably once a second."""
@@ -162,7 +164,7 @@ class Jobs:
         now = time.monotonic()
         if now - self._saved.get(task, 0.0) >= SAVE_EVERY:
             self._saved[task] = now
-            self._record(self._store.jobs.save_progress, task, progress)
+            self._record(self._store.jobs.save_progress, task, self._owner, progress)
         self._wake(task)
 
     def task_ended(self, task: str, ending: Ending) -> None:
@@ -182,6 +184,12 @@ class Jobs:
         self._record(self._send_again, task)
 
     # Inside
+
+    def _take_up(self) -> None:
+        """Claim what nobody runs, and send it."""
+        while taken := self._store.jobs.claim(self._owner, MOST_CLAIMED):
+            for job in taken:
+                self._sender.submit(self._send, job)
 
     def _send(self, job: Job) -> None:
         if not self._ready():
@@ -203,7 +211,7 @@ class Jobs:
     def _stop(self, job: Job) -> None:
         if job.state == "queued":
             self._cancelled.add(job.id)
-            self._store.jobs.finish(job.id, "cancelled")
+            self._store.finish_job(job.id, "cancelled")
             self._wake(job.id)
         self._canceller.submit(self._cluster.cancel, job.id, self._kinds[job.kind].grace)
 
@@ -220,7 +228,7 @@ class Jobs:
             return
         if job.attempts + 1 >= MOST_ATTEMPTS:
             self._fail(task, "worker-lost", "The job's workers were lost each time it was tried.")
-        elif self._store.jobs.requeue(task):
+        elif self._store.jobs.requeue(task, self._owner):
             self._sender.submit(self._send, replace(job, attempts=job.attempts + 1))
 
     def _record(self, write: Callable[..., Any], task: str, *values: Any, **named: Any) -> None:

@@ -21,11 +21,11 @@ from sqlalchemy.dialects.sqlite import insert as insert_or
 from .data_directory import DataDirectory
 from .database import Database
 from .errors import Busy, Conflict, NotFound, Unavailable
-from .job_store import JobStore
+from .job_store import UNFINISHED, JobStore
 from .mapping_store import MappingStore
 from .settings import Limits
 from .setup_store import SetupStore
-from .tables import job_files, jobs, mappings, measurements, sessions, uploads
+from .tables import job_files, job_parts, jobs, mappings, measurements, sessions, uploads
 
 SEEN_EVERY = 60.0
 UNUSED_AFTER = 3600.0
@@ -97,6 +97,8 @@ class Store:
         self.mappings = MappingStore(self.database, self._require_room)
         self._seen: dict[str, float] = {}
         self._originals = threading.Lock()
+        # The lock of the directory tells that whoever ran them is gone.
+        self.jobs.take_back_all()
         with self.database.reading() as connection:
             kept = set(connection.execute(select(uploads.c.sha256)).scalars())
         self.directory.sweep(kept)
@@ -252,7 +254,10 @@ class Store:
         measured = size.select_from(measurements.join(uploads)).where(
             measurements.c.session == session
         )
-        made = size.select_from(jobs.join(job_files).join(uploads)).where(jobs.c.session == session)
+        made = (
+            size.select_from(jobs.join(table).join(uploads)).where(jobs.c.session == session)
+            for table in (job_files, job_parts)
+        )
         columns = (
             measurements.c.manoeuvre,
             measurements.c.mapping,
@@ -266,7 +271,7 @@ class Store:
             )
             for column in columns
         )
-        total = sum(connection.execute(part).scalar_one() for part in (measured, made, *told))
+        total = sum(connection.execute(part).scalar_one() for part in (measured, *made, *told))
         if total + more > self.limits.session_bytes:
             raise Busy(
                 f"The session's measurements and sweeps would exceed "
@@ -403,19 +408,56 @@ class Store:
             self._require_room(connection, session, more)
 
     def finish_job(self, job: str, state: str, *, file: bytes | None = None, **found: Any) -> bool:
-        """Give a job its final state, see `JobStore.finish`, and keep the file it made."""
-        if file is None:
-            return self.jobs.finish(job, state, **found)
+        """Give a job its final state, see `JobStore.finish`, and keep the file it made; its parts
+        go.
+        """
         with self._originals:
-            with self.database.writing() as connection:
-                sha256 = self._keep(connection, file, time.time())
+            sha256 = None
+            if file is not None:
+                with self.database.writing() as connection:
+                    sha256 = self._keep(connection, file, time.time())
             ended = self.jobs.finish(job, state, file=sha256, **found)
-            if not ended:
-                self._drop_unreferenced()
+            self._drop_unreferenced()
         return ended
 
+    def keep_part(self, job: str, name: str, data: bytes) -> bool:
+        """Keep what a job has found so far under a name, durably, until the job ends; False where
+        it has ended.
+
+        What is kept under that name already stays. Parts count in the session's bytes, but are not
+        refused: what a job may take was asked for when it was taken.
+        """
+        mine = (job_parts.c.job == job) & (job_parts.c.name == name)
+        with self._originals, self.database.writing() as connection:
+            unfinished = jobs.c.state.in_(UNFINISHED)
+            found = connection.execute(
+                select(jobs.c.id).where(jobs.c.id == job, unfinished).with_for_update()
+            ).one_or_none()
+            if found is None:
+                return False
+            if connection.execute(select(job_parts.c.name).where(mine)).one_or_none() is None:
+                sha256 = self._keep(connection, data, time.time())
+                connection.execute(insert(job_parts).values(job=job, name=name, sha256=sha256))
+        return True
+
+    def part_names(self, job: str) -> list[str]:
+        """Names of what is kept of a job that runs, in their order."""
+        with self.database.reading() as connection:
+            query = select(job_parts.c.name).where(job_parts.c.job == job)
+            return sorted(connection.execute(query).scalars())
+
+    def part(self, job: str, name: str) -> bytes:
+        """What is kept of a job under a name; `NotFound` once it has ended."""
+        with self.database.reading() as connection:
+            sha256 = connection.execute(
+                select(job_parts.c.sha256).where(job_parts.c.job == job, job_parts.c.name == name)
+            ).scalar_one_or_none()
+        if sha256 is None:
+            raise NotFound(f"There is no part {name} of the job {job} any more.")
+        return self.directory.original(sha256).read_bytes()
+
     def delete_job(self, session: str, job: str) -> None:
-        """Remove a job with its result and its file."""
+        """Remove a job with its result, its file and its parts."""
         with self._originals:
             self.jobs.delete(session, job)
             self._drop_unreferenced()
@@ -425,7 +467,7 @@ class Store:
         with self.database.writing() as connection:
             unreferenced = [
                 uploads.c.sha256.not_in(select(table.c.sha256))
-                for table in (measurements, job_files)
+                for table in (measurements, job_files, job_parts)
             ]
             gone = connection.execute(
                 delete(uploads).where(*unreferenced).returning(uploads.c.sha256)

@@ -1,7 +1,8 @@
 """The tables of the service's database.
 
 Times are seconds since 1970. JSON is kept as text, written and read whole. An upload is one file,
-kept once under its SHA-256 however many measurements are made of it; what a job makes is one too.
+kept once under its SHA-256 however many measurements are made of it; what a job makes is one too,
+and so is each part of it that is kept while it runs.
 """
 
 from sqlalchemy import (
@@ -27,6 +28,12 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
     ),
     ("ALTER TABLE measurements ADD COLUMN conditioned TEXT",),
     ("ALTER TABLE sessions ADD COLUMN setup TEXT",),
+    (
+        "ALTER TABLE jobs ADD COLUMN owner VARCHAR(64)",
+        "ALTER TABLE jobs ADD COLUMN heartbeat_at FLOAT NOT NULL DEFAULT 0",
+        "ALTER TABLE jobs ADD COLUMN cancel_asked BOOLEAN NOT NULL DEFAULT FALSE",
+        "ALTER TABLE jobs ADD COLUMN priority INTEGER NOT NULL DEFAULT 0",
+    ),
 )
 """What leads from each version of the schema, the first being 1, to the next."""
 
@@ -106,6 +113,10 @@ jobs = Table(
     Column("finished", Float),
     Column("attempts", Integer, nullable=False, default=0),
     Column("restarts", Integer, nullable=False, default=0),
+    Column("owner", String(64)),
+    Column("heartbeat_at", Float, nullable=False, default=0.0),
+    Column("cancel_asked", Boolean, nullable=False, default=False),
+    Column("priority", Integer, nullable=False, default=0),
     UniqueConstraint("session", "key"),
 )
 
@@ -123,8 +134,17 @@ job_files = Table(
     Column("sha256", String(64), ForeignKey("uploads.sha256"), nullable=False),
 )
 
+job_parts = Table(
+    "job_parts",
+    metadata,
+    Column("job", String(32), ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True),
+    Column("name", String(200), primary_key=True),
+    Column("sha256", String(64), ForeignKey("uploads.sha256"), nullable=False),
+)
+
 Index("measurements_of_session", measurements.c.session, measurements.c.created)
 Index("measurements_of_upload", measurements.c.sha256)
 Index("job_files_of_upload", job_files.c.sha256)
+Index("job_parts_of_upload", job_parts.c.sha256)
 Index("jobs_of_session", jobs.c.session, jobs.c.created)
 Index("jobs_by_state", jobs.c.state)

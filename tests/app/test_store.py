@@ -98,7 +98,7 @@ def test_a_database_of_another_version_is_refused(tmp_path):
     DataDirectory(tmp_path).close()
 
 
-@pytest.mark.parametrize("version", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("version", [1, 2, 3, 4, 5, 6])
 def test_a_database_of_an_earlier_version_is_taken_over(tmp_path, version):
     """Oracle: what it kept; afterwards it keeps all that is new since like any other."""
     store = Store(tmp_path, Limits())
@@ -107,7 +107,11 @@ def test_a_database_of_an_earlier_version_is_taken_over(tmp_path, version):
     store.jobs.finish(done, "done", result={"cost": 1.5})
     store.close()
     with sqlite3.connect(tmp_path / "ridetune.sqlite") as connection:
-        connection.execute("ALTER TABLE sessions DROP COLUMN setup")
+        for column in ("owner", "heartbeat_at", "cancel_asked", "priority"):
+            connection.execute(f"ALTER TABLE jobs DROP COLUMN {column}")
+        connection.execute("DROP TABLE job_parts")
+        if version < 6:
+            connection.execute("ALTER TABLE sessions DROP COLUMN setup")
         if version < 5:
             connection.execute("ALTER TABLE measurements DROP COLUMN conditioned")
         if version < 4:
@@ -134,6 +138,8 @@ def test_a_database_of_an_earlier_version_is_taken_over(tmp_path, version):
     store.setups.change(session, SetupForm(starts=16))
     assert (store.session(session).setup or {})["starts"] == 16
     assert store.set_manoeuvre(session, kept.id, {"name": "lap"}).manoeuvre == {"name": "lap"}
+    assert [one.id for one in store.jobs.claim("me", 5)] == [job]
+    assert store.keep_part(job, "first", b"half the rows")
     assert store.finish_job(job, "done", result={}, file=b"rows")
     store.close()
 
@@ -266,8 +272,8 @@ def test_a_final_state_stays(store, session):
     job = queued(store, session)
     assert store.jobs.finish(job, "cancelled")
     assert not store.jobs.finish(job, "done", result={"late": True})
-    assert not store.jobs.start(job)
-    assert not store.jobs.requeue(job)
+    assert not store.jobs.start(job, "me")
+    assert not store.jobs.requeue(job, "me")
     kept = store.jobs.get(session, job)
     assert (kept.state, kept.result) == ("cancelled", None)
 
@@ -375,16 +381,6 @@ def test_a_measurement_in_use_keeps_its_mapping(store, session):
         store.set_mapping(session, kept.id, {}, {}, {})
     store.jobs.finish(job, "cancelled")
     assert store.set_mapping(session, kept.id, {}, {}, {}).mapping == {}
-
-
-def test_a_restart_takes_running_jobs_back_and_counts_it_apart(store, session):
-    job = queued(store, session)
-    store.jobs.start(job)
-    store.jobs.requeue_all()
-    kept = store.jobs.get(session, job)
-    assert (kept.state, kept.restarts, kept.attempts, kept.started) == ("queued", 1, 0, None)
-    assert store.jobs.requeue(job)
-    assert store.jobs.get(session, job).attempts == 1
 
 
 def test_jobs_of_another_session_are_not_found(store, session):
