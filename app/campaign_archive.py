@@ -2,9 +2,10 @@
 
 import hashlib
 import io
+import json
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
-from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
+from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile, ZipInfo
 
 from .worker import WithFile
 
@@ -13,31 +14,51 @@ if TYPE_CHECKING:
     from ..engine.recording_files import Form
 
 
+def archive_of(recording: "Recording", planned: "Campaign", form: "Form", date: datetime) -> bytes:
+    """One drive as it is kept until all have ended: its files, and what became of it as comment."""
+    from ..engine.recording_files import files_of
+
+    state = "missing" if recording.run is None else "partial" if recording.failure else "whole"
+    stem = f"{recording.name}.partial" if state == "partial" else recording.name
+    became = {
+        "name": recording.name,
+        "state": state,
+        "failure": recording.failure,
+        "file": None if recording.run is None else f"{stem}.{form}",
+    }
+    stream = io.BytesIO()
+    with ZipFile(stream, "w", ZIP_STORED) as archive:
+        for name, data in files_of(recording, planned, form, date).items():
+            archive.writestr(name, data)
+        archive.comment = json.dumps(became).encode()
+    return stream.getvalue()
+
+
 class CampaignArchive:
-    """Written as the drives end, so that little is left to do when they are cut short."""
+    """Made of the drives that have ended."""
 
     def __init__(self, planned: "Campaign", form: "Form", date: datetime):
         from ..engine.recording_files import files_of_car
 
         self._planned, self._date = planned, date
-        self._form: Form = form
-        self._ended: dict[str, Recording] = {}
+        self._became: dict[str, dict[str, Any]] = {}
         self._listed: dict[str, dict[str, Any]] = {}
         self._stream = io.BytesIO()
         self._archive = ZipFile(self._stream, "w")
         self._write(files_of_car(planned))
 
-    def add(self, recording: "Recording") -> None:
-        """What is left of a drive."""
-        from ..engine.recording_files import files_of
-
-        self._ended[recording.name] = recording
-        self._write(files_of(recording, self._planned, self._form, self._date))
+    def add(self, drive: bytes) -> None:
+        """What is left of a drive, see `archive_of`."""
+        with ZipFile(io.BytesIO(drive)) as archive:
+            became = json.loads(archive.comment)
+            self._write({name: archive.read(name) for name in archive.namelist()})
+        file = self._listed.get(became["file"])
+        self._became[became["name"]] = {**became, "sha256": file and file["sha256"]}
 
     def closed(self) -> WithFile:
         """All files, their list, and what became of each drive."""
         self._archive.close()
-        recordings = [self._became(name) for name in self._planned.manoeuvres]
+        recordings = [self._became.get(name) or _missing(name) for name in self._planned.manoeuvres]
         found = {"recordings": recordings, "files": list(self._listed.values())}
         return WithFile(found, self._stream.getvalue())
 
@@ -49,19 +70,8 @@ class CampaignArchive:
             digest = hashlib.sha256(data).hexdigest()
             self._listed[name] = {"name": name, "bytes": len(data), "sha256": digest}
 
-    def _became(self, name: str) -> dict[str, Any]:
-        """One drive: whole, the part before it broke off, or missing, and why."""
-        recording = self._ended.get(name)
-        if recording is None:
-            why = "The campaign was cancelled before this drive ended."
-            return {"name": name, "state": "missing", "failure": why, "file": None, "sha256": None}
-        state = "missing" if recording.run is None else "partial" if recording.failure else "whole"
-        stem = f"{name}.partial" if state == "partial" else name
-        file = self._listed.get(f"{stem}.{self._form}")
-        return {
-            "name": name,
-            "state": state,
-            "failure": recording.failure,
-            "file": file and file["name"],
-            "sha256": file and file["sha256"],
-        }
+
+def _missing(name: str) -> dict[str, Any]:
+    """A drive that had not ended."""
+    why = "The campaign was cancelled before this drive ended."
+    return {"name": name, "state": "missing", "failure": why, "file": None, "sha256": None}

@@ -1,31 +1,28 @@
-"""A campaign as a background job: what goes to the worker, what the worker does, what comes back.
+"""A campaign as a background job: what goes to the workers, what they do, what comes back.
 
-The worker gets everything by value and gives the files back as one archive, so it needs neither the
-database nor the data directory and may be another machine.
+Its units are its drives. A worker gets everything by value and gives files back as one archive, so
+it needs neither the database nor the data directory and may be another machine.
 """
 
 import re
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict
+import time
+from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-from .campaign_archive import CampaignArchive
+from .campaign_archive import CampaignArchive, archive_of
 from .errors import InvalidRequest, OverBudget
+from .job_kinds import PATIENT, Division, Kind, Progress
 from .job_store import Job
-from .jobs import Kind
 from .plants import Known, known_plant
 from .schemas import CampaignRequest
 from .settings import Limits
-from .worker import CutShort, Report, WithFile
+from .worker import Attempt, CutShort, WithFile
 
 if TYPE_CHECKING:
     from ..engine.campaign import Campaign
 
 KIND = "campaign"
-
-GRACE = 15.0
-"""How long a cancelled campaign has to hand over its recordings, s: they may have taken minutes."""
 
 NAME = re.compile(r"[A-Za-z0-9_-]{1,60}")
 """What a recording may be called: it becomes a file's name."""
@@ -43,7 +40,8 @@ def campaign() -> Kind:
     def payload(job: Job) -> dict[str, Any]:
         return job.spec
 
-    return Kind(task=drive_manoeuvres, payload=payload, grace=GRACE)
+    drives = Division(names=_drives, unit=drive_one, progress=_progress, slow=_slow, cut_short=True)
+    return Kind(task=join_drives, payload=payload, division=drives, priority=PATIENT)
 
 
 def check_and_fill(
@@ -141,22 +139,56 @@ def most_bytes(planned: "Campaign") -> int:
     return FRAME_BYTES * (1 + len(planned.manoeuvres)) + round(VALUE_BYTES * values)
 
 
-def drive_manoeuvres(payload: Any, report: Report, cancelled: Callable[[], bool]) -> WithFile:
-    """On the worker: drive, reporting how far it is; all files as one archive.
+def _drives(spec: Mapping[str, Any]) -> list[str]:
+    """Names of the recordings."""
+    return list(_planned(spec).manoeuvres)
 
-    Raises CutShort with the drives that had ended when it was cancelled.
+
+def _slow(spec: Mapping[str, Any]) -> bool:
+    """Whether a drive takes longer than a person waits."""
+    return _planned(spec).plant.long
+
+
+def _progress(spec: Mapping[str, Any], drives: Mapping[str, Progress], at_once: int) -> Progress:
+    """How far all drives are; `seconds` are those of the workers together."""
+    planned = _planned(spec)
+    counted = {
+        name: sum(one.get(name, 0) for one in drives.values())
+        for name in ("runs", "failed", "driven", "seconds")
+    }
+    return {
+        **counted,
+        "of": len(planned.manoeuvres),
+        "duration": planned.seconds,
+        "at_once": at_once,
+    }
+
+
+def drive_one(payload: Any, attempt: Attempt) -> WithFile:
+    """On a worker: one drive, reporting how far it is; its files as an archive."""
+    planned, name, began = _planned(payload), payload["unit"], time.perf_counter()
+
+    def reached(driven: float, **ended: int) -> dict[str, Any]:
+        return {"driven": driven, "seconds": time.perf_counter() - began, **ended}
+
+    recording = planned.record(
+        name, lambda seconds: attempt.report(reached(seconds)), attempt.cancelled
+    )
+    ended = reached(recording.manoeuvre.duration, runs=1, failed=int(bool(recording.failure)))
+    date = datetime.fromisoformat(payload["date"])
+    return WithFile(ended, archive_of(recording, planned, payload["format"], date))
+
+
+def join_drives(payload: Any, attempt: Attempt) -> WithFile:
+    """On a worker: the files of all drives as one archive.
+
+    Raises CutShort with those that had ended where the campaign was cancelled before all had.
     """
-    from ..engine.campaign_run import drive
-    from ..engine.errors import Cancelled
-
     planned = _planned(payload)
     archive = CampaignArchive(planned, payload["format"], datetime.fromisoformat(payload["date"]))
-    try:
-        # One after the other: a worker may not have processes of its own.
-        for recording in drive(
-            planned, processes=1, progress=lambda now: report(asdict(now)), cancelled=cancelled
-        ):
-            archive.add(recording)
-    except Cancelled:
-        raise CutShort(archive.closed()) from None
+    for name in planned.manoeuvres:
+        if name in attempt.kept:
+            archive.add(attempt.kept[name])
+    if len(attempt.kept) < len(planned.manoeuvres):
+        raise CutShort(archive.closed())
     return archive.closed()

@@ -10,6 +10,7 @@ Dask forgets everything with its scheduler; what must last is the caller's busin
 import logging
 import os
 import threading
+import time
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,6 +21,12 @@ from . import worker
 from .errors import Unavailable
 
 log = logging.getLogger(__name__)
+
+LOOK_EVERY = 2.0
+"""Time between two looks at a scheduler elsewhere, s; it has as long to connect."""
+
+ANSWER = 5.0
+"""Time that a scheduler has for an answer, s."""
 
 CONFIGURATION = {
     # The default of 15 s drops a nanny for good whose worker is lost twice in that time.
@@ -40,11 +47,16 @@ class Listener(Protocol):
     def task_progressed(self, task: str, progress: Mapping[str, Any]) -> None:
         """The task reports how far it has come."""
 
+    def task_kept(self, task: str, part: str, data: bytes) -> None:
+        """A part of the task's work is done and need not be done again."""
+
     def task_ended(self, task: str, ending: worker.Ending) -> None:
         """The task has ended by itself, or as asked."""
 
-    def task_lost(self, task: str) -> None:
-        """The task went with its scheduler; it may be submitted again."""
+    def task_lost(self, task: str, *, with_worker: bool) -> None:
+        """The task may be submitted again: its result went with its worker, or it with the
+        scheduler, which is not its fault.
+        """
 
 
 @dataclass
@@ -70,12 +82,34 @@ class Cluster:
         self._tasks: dict[str, _Task] = {}
         self._submissions = 0
         self._client: Any = None
+        self._scheduler, self._there, self._looked = "", 0, 0.0
         self._local: Any = None
         self._leave: threading.Timer | None = None
         self._closed = False
 
-    def submit(self, name: str, task: worker.Task, payload: Any, listener: Listener) -> None:
-        """Run a task once; blocks while the cluster starts."""
+    def width(self) -> int:
+        """How many tasks run at a time; Unavailable where the workers cannot be reached."""
+        if not self._address:
+            return self._workers
+        with self._lock:
+            self._started()
+            return max(self._there, 1)
+
+    def submit(
+        self,
+        name: str,
+        task: worker.Task,
+        payload: Any,
+        listener: Listener,
+        *,
+        kept: Mapping[str, bytes] | None = None,
+        priority: int = 0,
+    ) -> None:
+        """Run a task once; blocks while the cluster starts, Unavailable where it does not.
+
+        kept : parts of its work that are done already
+        priority : tasks of a higher one are taken up first
+        """
         with self._lock:
             if self._closed:
                 return
@@ -90,8 +124,10 @@ class Cluster:
                     name,
                     task,
                     payload,
+                    dict(kept or {}),
                     key=f"{name}-{self._submissions}",
                     pure=False,
+                    priority=priority,
                 )
             known.future = future
         future.add_done_callback(lambda done: self._ended(name, done))
@@ -104,7 +140,7 @@ class Cluster:
                 return
             task.cancelled = True
             client = self._client
-        client.run(worker.ask_to_stop, name, on_error="ignore")
+        _run(client, worker.ask_to_stop, name)
         if task.address:
             timer = threading.Timer(grace, self._kill, (name,))
             timer.daemon = True
@@ -118,17 +154,19 @@ class Cluster:
             self._closed = True
             if self._client is not None and self._tasks:
                 # A worker that still computes would hold up the end for seconds.
-                self._client.run(worker.ask_to_stop, *self._tasks, on_error="ignore")
+                _run(self._client, worker.ask_to_stop, *self._tasks)
             self._stop()
 
     def _started(self) -> Any:
         if self._leave is not None:
             self._leave.cancel()
+        if self._client is not None and self._address:
+            self._look()
         if self._client is None:
             try:
                 self._client = self._start()
             except (OSError, RuntimeError) as error:
-                self._stop()
+                self._disconnect()
                 where = f"at {self._address}" if self._address else "on this machine"
                 log.error("cannot start or reach the job workers %s: %s", where, error)
                 raise Unavailable(
@@ -136,7 +174,28 @@ class Cluster:
                     "look at the service's log."
                 ) from None
             self._client.subscribe_topic(worker.TOPIC, self._heard)
+            if self._address:
+                self._look()
         return self._client
+
+    def _look(self) -> None:
+        """Count the workers of a scheduler elsewhere; give up a client whose scheduler is gone or
+        another one since: Dask's goes on with that, but hears nothing of tasks.
+        """
+        now = time.monotonic()
+        if now - self._looked < LOOK_EVERY:
+            return
+        client = self._client
+        try:
+            seen = client.sync(client.scheduler.identity, n_workers=0, callback_timeout=ANSWER)
+        except (OSError, RuntimeError) as error:
+            log.warning("lost the scheduler at %s: %s", self._address, error)
+            self._disconnect()
+            return
+        if self._scheduler not in ("", seen["id"]):
+            self._disconnect()
+            return
+        self._looked, self._scheduler, self._there = now, seen["id"], seen["total_threads"]
 
     def _start(self) -> Any:
         from dask import config
@@ -145,7 +204,7 @@ class Cluster:
         config.set(CONFIGURATION)
         logging.getLogger("distributed").setLevel(logging.ERROR)
         if self._address:
-            return Client(self._address, set_as_default=False, name="ridetune")
+            return Client(self._address, set_as_default=False, name="ridetune", timeout=LOOK_EVERY)
         no_dashboard: Any = None
         self._local = LocalCluster(
             n_workers=self._workers,
@@ -160,13 +219,20 @@ class Cluster:
         return Client(self._local, set_as_default=False, name="ridetune")
 
     def _stop(self) -> None:
+        self._disconnect()
+        self._tasks.clear()
+
+    def _disconnect(self) -> None:
+        """Let go of the client; tasks that it still had are told to be lost."""
         if self._leave is not None:
             self._leave.cancel()
-        for part in (self._client, self._local):
-            if part is not None:
-                part.close()
+        client, local = self._client, self._local
         self._client = self._local = None
-        self._tasks.clear()
+        self._scheduler, self._looked = "", 0.0
+        if client is not None:
+            client.close(timeout=ANSWER)
+        if local is not None:
+            local.close()
 
     def _heard(self, event: tuple[float, dict[str, Any]]) -> None:
         news = event[1]
@@ -176,6 +242,8 @@ class Cluster:
         if "process" in news:
             task.address, task.process = news["address"], news["process"]
             task.listener.task_started(news["task"])
+        elif "part" in news:
+            task.listener.task_kept(news["task"], news["part"], news["data"])
         else:
             task.listener.task_progressed(news["task"], news["progress"])
 
@@ -184,6 +252,7 @@ class Cluster:
         task = self._tasks.get(name)
         if task is None or task.future is not future:
             return
+        lost = future.status not in ("finished", "error") and not task.cancelled
         ending = _ending_of(task, future)
         with self._lock:
             if self._closed or self._tasks.get(name) is not task:
@@ -191,7 +260,7 @@ class Cluster:
             del self._tasks[name]
             self._leave_later()
         if ending is None:
-            task.listener.task_lost(name)
+            task.listener.task_lost(name, with_worker=not lost)
         else:
             task.listener.task_ended(name, ending)
 
@@ -214,7 +283,15 @@ class Cluster:
                 return
             client = self._client
         task.future.cancel()
-        client.run(worker.kill, task.process, workers=[task.address], nanny=True, on_error="ignore")
+        _run(client, worker.kill, task.process, workers=[task.address], nanny=True)
+
+
+def _run(client: Any, function: Any, *values: Any, **where: Any) -> None:
+    """Call a function on the workers; where they are gone there is nothing to call it for."""
+    try:
+        client.run(function, *values, on_error="ignore", **where)
+    except (OSError, RuntimeError) as error:
+        log.warning("cannot reach the job workers: %s", error)
 
 
 def _ending_of(task: _Task, future: Any) -> worker.Ending | None:

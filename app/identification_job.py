@@ -4,21 +4,25 @@ The worker gets everything by value (vehicle, recordings, options), so it needs 
 database nor the data directory and may be another machine.
 """
 
-from collections.abc import Callable, Mapping
+import json
+from collections.abc import Mapping
 from typing import Any
 
 from ..engine.parameters import ALL_NAMES, PARAMETER_NAMES, parameter
 from ..engine.run import Run
 from .errors import Conflict, OverBudget
+from .job_kinds import Kind, digest
 from .job_store import Job
-from .jobs import Kind, digest
 from .recordings import Recordings, as_stated, with_braking
 from .schemas import IdentificationRequest
 from .settings import Limits
 from .store import Measurement, Store
-from .worker import Report, Task
+from .worker import Attempt, Task
 
 KIND = "identification"
+
+SEARCH = "search-"
+"""What the names of kept searches begin with."""
 
 UNTOLD = {
     name: IdentificationRequest.model_fields[name].get_default()
@@ -106,8 +110,11 @@ def build_problem(spec: Mapping[str, Any], runs: list[Run]) -> Any:
     return problem
 
 
-def identify_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -> dict[str, Any]:
-    """On the worker: fit, reporting after every evaluation; the fit as JSON."""
+def identify_runs(payload: Any, attempt: Attempt) -> dict[str, Any]:
+    """On the worker: fit, reporting after every evaluation; the fit as JSON. Of many starts each
+    search that ends is kept.
+    """
+    from ..engine.identification.ended_search import EndedSearch
     from ..engine.identification.fit import Stage
     from ..engine.identification.fit_file import fit_to_json
     from ..engine.identification.identify import identify
@@ -120,7 +127,7 @@ def identify_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -
     def progress(now: Any) -> None:
         if now.stage != Stage.SCREENING:
             costs.append(now.cost)
-        report(
+        attempt.report(
             {
                 "cost": now.cost,
                 "cost_history": list(costs),
@@ -135,12 +142,22 @@ def identify_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -
             }
         )
 
+    def keep(number: int, search: EndedSearch) -> None:
+        if payload["starts"] > 1:
+            attempt.keep(f"{SEARCH}{number}", json.dumps(search.to_json()).encode())
+
+    ended = {
+        int(name.removeprefix(SEARCH)): EndedSearch.from_json(json.loads(data))
+        for name, data in attempt.kept.items()
+    }
     fit = identify(
         problem,
         progress=progress,
-        cancelled=cancelled,
+        cancelled=attempt.cancelled,
         starts=payload["starts"],
         seed=payload["seed"],
+        ended=ended,
+        keep=keep,
     )
     return fit_to_json(fit)
 

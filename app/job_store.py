@@ -19,6 +19,7 @@ from sqlalchemy import (
     ColumnElement,
     Connection,
     Row,
+    ScalarSelect,
     Select,
     case,
     delete,
@@ -175,21 +176,25 @@ class JobStore:
             query = _select(*conditions).order_by(jobs.c.created)
             return [_job(row) for row in connection.execute(query)]
 
-    def claim(self, owner: str, most: int) -> list[Job]:
+    def claim(self, owner: str, most: int, *, least_priority: int = 0) -> list[Job]:
         """Make unfinished jobs that nobody runs the owner's, `most` at once, those of the highest
-        priority first, then the oldest.
+        priority first, then those of the session of which the fewest are run, then the oldest.
 
         Whichever of them was asked to stop is cancelled instead.
         """
+        now = self._database.now
+        # Also where a clock went back, the lease has run out.
+        lapsed = func.abs(jobs.c.heartbeat_at - now) > LEASE
+        free = jobs.c.state.in_(UNFINISHED) & or_(
+            jobs.c.owner.is_(None), (jobs.c.owner != owner) & lapsed
+        )
+        free &= jobs.c.priority >= least_priority
+        with self._database.reading() as connection:
+            if connection.execute(select(jobs.c.id).where(free).limit(1)).first() is None:
+                return []
         with self._database.writing() as connection:
-            now = self._database.now
-            # Also where a clock went back, the lease has run out.
-            lapsed = func.abs(jobs.c.heartbeat_at - now) > LEASE
-            free = jobs.c.state.in_(UNFINISHED) & or_(
-                jobs.c.owner.is_(None), (jobs.c.owner != owner) & lapsed
-            )
             stopped = select(jobs.c.id).where(free, jobs.c.cancel_asked)
-            order = (jobs.c.priority.desc(), jobs.c.created, jobs.c.id)
+            order = (jobs.c.priority.desc(), _run_of_session(), jobs.c.created, jobs.c.id)
             waiting = select(jobs.c.id).where(free, ~jobs.c.cancel_asked).order_by(*order)
             self._cancel(connection, _locked(connection, stopped))
             taken = _locked(connection, waiting.limit(most))
@@ -313,6 +318,14 @@ class JobStore:
         values = {"state": "cancelled", "finished": self._database.now}
         connection.execute(update(jobs).where(jobs.c.id.in_(chosen)).values(**values))
         connection.execute(delete(job_parts).where(job_parts.c.job.in_(chosen)))
+
+
+def _run_of_session() -> ScalarSelect[int]:
+    """How many jobs of a job's session somebody runs."""
+    others = jobs.alias()
+    mine = (others.c.session == jobs.c.session) & others.c.state.in_(UNFINISHED)
+    query = select(func.count()).where(mine, others.c.owner.is_not(None))
+    return query.correlate(jobs).scalar_subquery()
 
 
 def _of(owner: str) -> ColumnElement[bool]:

@@ -1,6 +1,5 @@
 """The profile of one parameter of a fit as a background job: what it needs, and what it does."""
 
-from collections.abc import Callable
 from typing import Any
 
 from ..engine.errors import ProblemError
@@ -10,7 +9,7 @@ from .identification_job import build_problem, fitted_recordings
 from .job_store import Job
 from .schemas import ProfileRequest
 from .store import Store
-from .worker import Report
+from .worker import Attempt
 
 KIND = "profile"
 
@@ -35,9 +34,7 @@ def check_and_fill(request: ProfileRequest, fitted: Job, store: Store) -> dict[s
     }
 
 
-def profile_parameter(
-    payload: Any, report: Report, cancelled: Callable[[], bool]
-) -> dict[str, Any]:
+def profile_parameter(payload: Any, attempt: Attempt) -> dict[str, Any]:
     """On the worker: the profile as JSON, reporting after every point."""
     from ..engine.identification.fit_file import profile_to_json
     from ..engine.identification.profile import profile
@@ -45,7 +42,7 @@ def profile_parameter(
     found = profile(
         build_problem(payload, payload["runs"]).as_fitted(payload["ended"]),
         payload["parameter"],
-        progress=lambda points: report({"points": points}),
-        cancelled=cancelled,
+        progress=lambda points: attempt.report({"points": points}),
+        cancelled=attempt.cancelled,
     )
     return profile_to_json(found)

@@ -13,9 +13,9 @@ from ..engine.run_notes import parse_notes
 from .access import SessionId
 from .campaign_job import KIND, check_and_fill
 from .errors import Conflict, NotFound
+from .job_kinds import as_asked
 from .job_routes import View, job_router, submitted
 from .job_store import Job
-from .jobs import as_asked
 from .measurement_view import measurements_to_json
 from .schemas import CampaignRequest
 from .services import Services, Shared

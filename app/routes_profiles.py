@@ -4,8 +4,8 @@ from typing import Any
 
 from .access import SessionId
 from .identification_job import KIND as IDENTIFICATION
+from .job_kinds import as_asked
 from .job_routes import View, job_router, submitted
-from .jobs import as_asked
 from .profile_job import KIND, check_and_fill
 from .schemas import ProfileRequest
 from .services import Services, Shared

@@ -8,8 +8,8 @@ from fastapi.responses import FileResponse, HTMLResponse
 from .access import SessionId
 from .errors import Conflict
 from .identification_job import KIND as IDENTIFICATION
+from .job_kinds import as_asked
 from .job_routes import View, job_router, submitted
-from .jobs import as_asked
 from .report import SERVED_POLICY, report
 from .schemas import ValidationRequest
 from .services import Services, Shared

@@ -420,9 +420,13 @@ class Store:
             self._drop_unreferenced()
         return ended
 
-    def keep_part(self, job: str, name: str, data: bytes) -> bool:
+    def keep_part(
+        self, job: str, name: str, data: bytes, progress: Mapping[str, Any] | None = None
+    ) -> bool:
         """Keep what a job has found so far under a name, durably, until the job ends; False where
         it has ended.
+
+        progress : how far that came, given back by `parts`
 
         What is kept under that name already stays. Parts count in the session's bytes, but are not
         refused: what a job may take was asked for when it was taken.
@@ -437,14 +441,18 @@ class Store:
                 return False
             if connection.execute(select(job_parts.c.name).where(mine)).one_or_none() is None:
                 sha256 = self._keep(connection, data, time.time())
-                connection.execute(insert(job_parts).values(job=job, name=name, sha256=sha256))
+                told = json.dumps(dict(progress or {}))
+                connection.execute(
+                    insert(job_parts).values(job=job, name=name, sha256=sha256, progress=told)
+                )
         return True
 
-    def part_names(self, job: str) -> list[str]:
-        """Names of what is kept of a job that runs, in their order."""
+    def parts(self, job: str) -> dict[str, dict[str, Any]]:
+        """What is kept of a job that runs: how far each part came, by its name, in their order."""
         with self.database.reading() as connection:
-            query = select(job_parts.c.name).where(job_parts.c.job == job)
-            return sorted(connection.execute(query).scalars())
+            query = select(job_parts.c.name, job_parts.c.progress).where(job_parts.c.job == job)
+            rows = connection.execute(query.order_by(job_parts.c.name)).all()
+        return {row.name: json.loads(row.progress) for row in rows}
 
     def part(self, job: str, name: str) -> bytes:
         """What is kept of a job under a name; `NotFound` once it has ended."""

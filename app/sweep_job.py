@@ -1,23 +1,23 @@
-"""A sweep as a background job: what goes to the worker, what the worker does, what comes back.
+"""A sweep as a background job: what goes to the workers, what they do, what comes back.
 
-The worker gets everything by value and gives the rows back as a Parquet file, so it needs neither
-the database nor the data directory and may be another machine.
+Its units are shares of its cars in a row. A worker gets everything by value and gives rows back as
+a Parquet file, so it needs neither the database nor the data directory and may be another machine.
 """
 
 import io
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
 from .errors import OverBudget
+from .job_kinds import PATIENT, Division, Kind, Progress, digest
 from .job_store import Job
-from .jobs import Kind, digest
 from .recordings import Recordings, as_stated, stated
 from .schemas import FullFactorialForm, SweepRequest
 from .settings import Limits
 from .store import Measurement, Store
-from .worker import Report, WithFile
+from .worker import Attempt, WithFile
 
 KIND = "sweep"
 
@@ -27,6 +27,12 @@ STATUS_BYTES = 100
 FRAME_BYTES = 100_000
 """What the file takes besides: what was swept, and Parquet's account of its columns."""
 
+UNIT_STEPS = 2_000_000
+"""Steps of all cars of a unit together: about a second of a core."""
+
+MOST_UNITS = 400
+"""Of longer sweeps the units are longer, too."""
+
 
 def sweep(store: Store, recordings: Recordings) -> Kind:
     """The job kind, bound to where its recordings are kept."""
@@ -35,7 +41,8 @@ def sweep(store: Store, recordings: Recordings) -> Kind:
         runs = [recordings.run(as_stated(store, job.session, run)) for run in job.spec["runs"]]
         return {**job.spec, "run": runs[0] if runs else None}
 
-    return Kind(task=sweep_cars, payload=payload)
+    shares = Division(names=_shares, unit=sweep_share, progress=_progress)
+    return Kind(task=join_shares, payload=payload, division=shares, priority=PATIENT)
 
 
 def as_asked(request: SweepRequest) -> str:
@@ -86,13 +93,15 @@ def check_and_fill(
     require_package("parquet")
     mode = mode_of(request)
     car, design = vehicle_from_json(vehicle), design_of(request.design)
-    _check_budget(design.cars, extent(request, kept, typical_cars(car, design))[1], limits)
+    steps = extent(request, kept, typical_cars(car, design))[1]
+    _check_budget(design.cars, steps, limits)
     run = None if kept is None else recordings.run(kept)
     driven = excitation_of(request, run)
     check_sweep(car, design, driven, threads_of(None))
     driven = stepped_alike(car, design, driven)
     spec = request.model_dump(mode="json", exclude={"key"})
-    spec |= {"vehicle": vehicle_to_json(car), "design": design.to_json()}
+    spec |= {"vehicle": vehicle_to_json(car), "design": design.to_json(), "cars": design.cars}
+    spec["share"] = _share(design.cars, steps)
     spec["runs"] = [] if kept is None else [stated(kept)]
     if mode != "rims":
         spec |= {name: getattr(driven, name) for name in ("step", "sample_step")}
@@ -122,26 +131,82 @@ def _check_budget(cars: int, steps: float, limits: Limits) -> None:
         )
 
 
-def sweep_cars(payload: Any, report: Report, cancelled: Callable[[], bool]) -> WithFile:
-    """On the worker: sweep, reporting how many cars are done; the rows as Parquet."""
-    from ..engine.sweeps.sweep import sweep as sweep_through
-    from ..engine.sweeps.sweep_file import description, write_blocks
+def _share(cars: int, steps: float) -> int:
+    """How many cars a unit has, of so many that take so many steps each."""
+    return max(1, round(UNIT_STEPS / steps), math.ceil(cars / MOST_UNITS))
+
+
+def _shares(spec: Mapping[str, Any]) -> list[str]:
+    """First and last car of each unit."""
+    starts = range(0, spec["cars"], spec["share"])
+    return [f"{first}-{min(first + spec['share'], spec['cars']) - 1}" for first in starts]
+
+
+def _progress(spec: Mapping[str, Any], shares: Mapping[str, Progress], at_once: int) -> Progress:
+    """Cars of all units; `seconds` are those of the workers together."""
+    known = [share for share in shares.values() if share]
+    counted = {name: sum(share[name] for share in known) for name in ("cars", "failed", "seconds")}
+    return {**counted, "of": spec["cars"]}
+
+
+def _swept(payload: Any) -> tuple[Any, Any, Any]:
+    """The engine's vehicle, design and excitation."""
     from ..engine.vehicle_file import vehicle_from_json
     from .excitation import excitation_of
 
     request = SweepRequest.model_validate(
         {name: payload[name] for name in SweepRequest.model_fields if name in payload}
     )
-    vehicle, design = vehicle_from_json(payload["vehicle"]), design_of(request.design)
     driven = excitation_of(request, payload["run"])
+    return vehicle_from_json(payload["vehicle"]), design_of(request.design), driven
+
+
+def sweep_share(payload: Any, attempt: Attempt) -> WithFile:
+    """On a worker: sweep some cars, reporting how many are done; their rows as Parquet."""
+    from ..engine.sweeps.sweep import sweep as sweep_through
+    from ..engine.sweeps.sweep_file import description, write_blocks
+
+    vehicle, design, driven = _swept(payload)
+    first, last = map(int, payload["unit"].split("-"))
     reached: dict[str, Any] = {}
 
     def progress(now: Any) -> None:
         reached.update(asdict(now))
-        report(reached)
+        attempt.report(reached)
 
-    blocks = sweep_through(vehicle, design, driven, progress=progress, cancelled=cancelled)
-    described, stream = description(vehicle, design, driven), io.BytesIO()
-    write_blocks(stream, "parquet", described, blocks)
-    result = {name: reached[name] for name in ("cars", "failed", "seconds")}
-    return WithFile({**result, "columns": described["columns"]}, stream.getvalue())
+    blocks = sweep_through(
+        vehicle,
+        design,
+        driven,
+        cars=range(first, last + 1),
+        threads=1,  # there are as many workers as cores
+        progress=progress,
+        cancelled=attempt.cancelled,
+    )
+    stream = io.BytesIO()
+    write_blocks(stream, "parquet", description(vehicle, design, driven), blocks)
+    return WithFile(
+        {name: reached[name] for name in ("cars", "failed", "seconds")}, stream.getvalue()
+    )
+
+
+def join_shares(payload: Any, attempt: Attempt) -> WithFile:
+    """On a worker: the rows of all units as one Parquet file."""
+    from itertools import chain
+
+    from ..engine.sweeps.figures import OK
+    from ..engine.sweeps.sweep_file import description, read_blocks, write_blocks
+
+    shares = [attempt.kept[name] for name in _shares(payload)]
+    failed = 0
+
+    def rows(share: bytes) -> Any:
+        nonlocal failed
+        for block in read_blocks(io.BytesIO(share))[1]:
+            failed += int((block["status"] != OK).sum())
+            yield block
+
+    described, stream = description(*_swept(payload)), io.BytesIO()
+    write_blocks(stream, "parquet", described, chain.from_iterable(map(rows, shares)))
+    result = {"cars": payload["cars"], "failed": failed, "columns": described["columns"]}
+    return WithFile(result, stream.getvalue())

@@ -140,6 +140,7 @@ job_parts = Table(
     Column("job", String(32), ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True),
     Column("name", String(200), primary_key=True),
     Column("sha256", String(64), ForeignKey("uploads.sha256"), nullable=False),
+    Column("progress", Text, nullable=False, default="{}"),
 )
 
 Index("measurements_of_session", measurements.c.session, measurements.c.created)

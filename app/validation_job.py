@@ -5,20 +5,20 @@ the database nor the data directory and may be another machine.
 """
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..engine.vehicle_file import vehicle_from_json
 from .errors import InvalidRequest
 from .identification_job import check_budget, done, fitted_recordings
+from .job_kinds import Kind
 from .job_store import Job
-from .jobs import Kind
 from .measurement_view import data_keys
 from .recordings import Recordings, as_stated, stated, with_braking
 from .schemas import ValidationRequest
 from .settings import Limits
 from .store import Measurement, Store
-from .worker import Report, WithFile
+from .worker import Attempt, WithFile
 
 KIND = "validation"
 
@@ -120,7 +120,7 @@ def _cases(spec: Mapping[str, Any], runs: list[Any]) -> list[Any]:
     ]
 
 
-def validate_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -> WithFile:
+def validate_runs(payload: Any, attempt: Attempt) -> WithFile:
     """On the worker: predict every run, reporting how far it is; the document as a file."""
     from ..engine.identification.kept_fit import fit_from_json
     from ..engine.simulation.rims_settings import RimsSettings
@@ -142,8 +142,8 @@ def validate_runs(payload: Any, report: Report, cancelled: Callable[[], bool]) -
         traction=fit["traction"],
         settings=RimsSettings(**fit["settings"]),
         fit=fit_from_json(fit),
-        progress=lambda done, of: report({"predictions": done, "of": of}),
-        cancelled=cancelled,
+        progress=lambda done, of: attempt.report({"predictions": done, "of": of}),
+        cancelled=attempt.cancelled,
     )
     document = validation_to_json(
         found,

@@ -1,10 +1,11 @@
 """What runs inside a job worker: one task at a time, at the lowest priority, able to stop.
 
-A task is a function of (payload, report, cancelled); it gives its result, with a file if it makes
+A task is a function of its payload and its `Attempt`; it gives its result, with a file if it makes
 one, or raises CutShort with what it had finished when it was cancelled. It is told to stop through
 a flag in this module, set by the worker's event loop while the task computes; it reports through
 the scheduler's event log, at most ten times a second, and always the whole progress, so nothing
-depends on the order or number of reports.
+depends on the order or number of reports. Parts that it keeps go the same way: one that is lost
+costs the time to make it again.
 """
 
 import os
@@ -19,8 +20,10 @@ TOPIC = "ridetune-tasks"
 LOWEST_PRIORITY = 19
 REPORT_EVERY = 0.1
 
+MOST_KEPT = 100_000
+"""Bytes of a part that a task keeps on its way; the scheduler holds the latest thousand."""
+
 State = Literal["done", "failed", "cancelled"]
-Report = Callable[[Mapping[str, Any]], None]
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,23 @@ class CutShort(Cancelled):
         self.kept = kept
 
 
-Task = Callable[[Any, Report, Callable[[], bool]], dict[str, Any] | WithFile]
+@dataclass(frozen=True)
+class Attempt:
+    """What a task has at hand while it runs.
+
+    report : told how far it is, all of it each time
+    cancelled : says whether to stop
+    keep : told the name of a part of the work that is done, and MOST_KEPT bytes of it at most
+    kept : parts by name that earlier attempts kept, or that units made for it
+    """
+
+    report: Callable[[Mapping[str, Any]], None]
+    cancelled: Callable[[], bool]
+    keep: Callable[[str, bytes], None]
+    kept: Mapping[str, bytes]
+
+
+Task = Callable[[Any, Attempt], dict[str, Any] | WithFile]
 
 _asked_to_stop: set[str] = set()
 
@@ -54,7 +73,7 @@ class Ending(TypedDict):
     file: NotRequired[bytes]
 
 
-def run(name: str, task: Task, payload: Any) -> Ending:
+def run(name: str, task: Task, payload: Any, kept: Mapping[str, bytes]) -> Ending:
     """Run a task to its end; unknown exceptions go to the scheduler as they are."""
     from distributed import get_worker
 
@@ -73,12 +92,17 @@ def run(name: str, task: Task, payload: Any) -> Ending:
             reported = time.monotonic()
             send(progress=progress)
 
+    def keep(part: str, data: bytes) -> None:
+        if len(data) > MOST_KEPT:
+            raise ValueError(f"{part} has {len(data)} bytes, a part may have {MOST_KEPT}")
+        send(part=part, data=data)
+
     def ending(state: State, result: Any = None, error: Any = None) -> Ending:
         return {"state": state, "result": result, "error": error, "progress": progress}
 
     send(address=worker.address, process=os.getpid())
     try:
-        found = task(payload, report, lambda: name in _asked_to_stop)
+        found = task(payload, Attempt(report, lambda: name in _asked_to_stop, keep, kept))
         if isinstance(found, WithFile):
             return {**ending("done", result=found.result), "file": found.file}
         return ending("done", result=found)

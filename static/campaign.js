@@ -147,9 +147,9 @@ function tools(running) {
 }
 
 function progress() {
-  const { runs, of, driven, duration, seconds } = current().progress ?? {};
+  const { runs, of, driven, duration, seconds, at_once: atOnce } = current().progress ?? {};
   if (current().state === "queued" || of === undefined) return "Waiting for a worker …";
-  const left = driven > 0 ? (seconds * (duration - driven)) / driven : 0;
+  const left = driven > 0 ? (seconds * (duration - driven)) / driven / Math.max(atOnce, 1) : 0;
   return `${runs} of ${of} drives, ${units.fixed(driven, 1)} of ${units.plain(duration, 4)} s` +
     form.taking(left, "left");
 }

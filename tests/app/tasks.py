@@ -4,11 +4,11 @@ import os
 import time
 
 
-def double(payload, report, cancelled):
+def double(payload, attempt):
     """Report twice, then give the payload doubled, with the priority and process it ran at."""
-    report({"cost": 1.0})
+    attempt.report({"cost": 1.0})
     time.sleep(0.15)
-    report({"cost": 0.5})
+    attempt.report({"cost": 0.5})
     return {
         "value": 2 * payload,
         "priority": os.getpriority(os.PRIO_PROCESS, 0),
@@ -16,53 +16,59 @@ def double(payload, report, cancelled):
     }
 
 
-def wait(payload, report, cancelled):
+def wait(payload, attempt):
     """Wait to be cancelled, looking every few milliseconds."""
     from ridetune.engine.errors import Cancelled
 
-    report({"cost": 1.0})
+    attempt.report({"cost": 1.0})
     until = time.monotonic() + 60
     while time.monotonic() < until:
-        if cancelled():
+        if attempt.cancelled():
             raise Cancelled("stopped")
         time.sleep(0.005)
     return {"value": "never cancelled"}
 
 
-def ignore(payload, report, cancelled):
+def ignore(payload, attempt):
     """Compute on, whatever is asked."""
-    report({"cost": 1.0})
+    attempt.report({"cost": 1.0})
     until = time.monotonic() + 60
     while time.monotonic() < until:
         time.sleep(0.01)
     return {"value": "never killed"}
 
 
-def write(payload, report, cancelled):
+def write(payload, attempt):
     """Make a file."""
     from ridetune.app.worker import WithFile
 
     return WithFile({"rows": len(payload)}, payload)
 
 
-def poison(payload, report, cancelled):
+def poison(payload, attempt):
     """Take the worker down."""
     os._exit(9)
 
 
-def refuse(payload, report, cancelled):
+def halfway(payload, attempt):
+    """Keep a part on the way."""
+    attempt.keep("half", payload)
+    return {}
+
+
+def refuse(payload, attempt):
     """Find something that the caller can mend."""
     from ridetune.engine.errors import SimulationDiverged
 
     raise SimulationDiverged(1.25, "chassis.roll", "soften it.")
 
 
-def crash(payload, report, cancelled):
+def crash(payload, attempt):
     """Fail in a way nobody foresaw."""
     raise ZeroDivisionError("secret detail")
 
 
-def die_once(payload, report, cancelled):
+def die_once(payload, attempt):
     """Take the first worker down, succeed on the second."""
     from pathlib import Path
 
@@ -70,3 +76,8 @@ def die_once(payload, report, cancelled):
         Path(payload).touch()
         os._exit(9)
     return {"value": "second time"}
+
+
+def kept(payload, attempt):
+    """Tell what is kept."""
+    return {name: data.hex() for name, data in attempt.kept.items()}

@@ -6,9 +6,9 @@ import time
 import zipfile
 
 import pytest
-from ridetune.app.campaign_job import drive_manoeuvres
+from ridetune.app.campaign_job import drive_one, join_drives
 from ridetune.app.settings import Limits, Settings
-from ridetune.app.worker import CutShort
+from ridetune.app.worker import Attempt, CutShort
 from ridetune.engine.campaign import CAMPAIGN, Campaign, chosen, roughened
 from ridetune.engine.campaign_run import drive
 from ridetune.engine.detailed.car_file import reference_car
@@ -21,7 +21,7 @@ from ridetune.engine.sensor_file import noisy
 from ridetune.engine.vehicle_file import reference_vehicles, vehicle_to_json
 
 from .conftest import PATIENCE, Visitor, open_client
-from .test_jobs import StandIn, until
+from .test_jobs import StandIn
 
 CAR = reference_vehicles()["paper"]
 PAPER = vehicle_to_json(CAR)
@@ -185,12 +185,19 @@ def test_own_manoeuvres_and_sensors(engineer):
     assert (lines[0], len(lines)) == ("time [s],chassis.z [m]", 202)
 
 
+def attempt(told: list, kept=None) -> Attempt:
+    """Nobody cancels it."""
+    return Attempt(told.append, lambda: False, lambda part, data: None, kept or {})
+
+
 def test_a_cancelled_campaign_keeps_what_had_ended(done):
-    """In the worker's task; the second drive had not begun when it was told to stop."""
-    asked = {**done, "noise": NOISE, "sensors": None}
-    runs = []
+    """In the workers' tasks; the second drive had not ended when it was told to stop."""
+    asked, told = {**done, "noise": NOISE, "sensors": None}, []
+    drive = drive_one({**asked, "unit": "manoeuvre_bump"}, attempt(told))
+    assert (drive.result["runs"], drive.result["failed"]) == (1, 0)
+    assert told[-1]["driven"] <= drive.result["driven"] == reference_manoeuvres()["bump"].duration
     with pytest.raises(CutShort) as stopped:
-        drive_manoeuvres(asked, lambda now: runs.append(now["runs"]), lambda: 1 in runs)
+        join_drives(asked, attempt([], {"manoeuvre_bump": drive.file}))
     whole, missing = stopped.value.kept.result["recordings"]
     assert (whole["name"], whole["state"]) == ("manoeuvre_bump", "whole")
     assert (missing["state"], missing["file"]) == ("missing", None)
@@ -305,26 +312,6 @@ def test_the_same_key_drives_once(tmp_path, monkeypatch):
         assert submit(visitor, key="click-1") == first
         other = visitor.post("/campaigns", json={**SHORT, "seed": 6, "key": "click-1"})
         assert (other.status_code, other.json()["field"]) == (422, "key")
-
-
-def test_a_campaign_has_longer_than_other_jobs_to_hand_over_what_it_has(tmp_path, monkeypatch):
-    """Before its worker is killed, and minutes of driving with it."""
-    made = []
-    monkeypatch.setattr(
-        "ridetune.app.main.Cluster", lambda *place: made.append(StandIn(*place)) or made[-1]
-    )
-    with open_client(Settings(data=tmp_path)) as client:
-        visitor = Visitor(client)
-        run = visitor.get("/measurements").json()[0]["id"]
-        fit = visitor.submit("identifications", {"runs": [run]})["id"]
-        drives = submit(visitor)["id"]
-        for kind, job in (("identifications", fit), ("campaigns", drives)):
-            until(lambda: job in made[0].tasks)
-            made[0].start(job)
-            visitor.wait_for(kind, job, "running")
-            visitor.post(f"/{kind}/{job}/cancel")
-            assert visitor.wait_for(kind, job)["state"] == "cancelled"
-        assert made[0].graces[drives] > made[0].graces[fit]
 
 
 def test_the_plants_are_listed(client):

@@ -7,7 +7,7 @@ import cloudpickle
 import pytest
 from ridetune.app.cluster import Cluster
 from ridetune.app.errors import Unavailable
-from ridetune.app.worker import Ending
+from ridetune.app.worker import MOST_KEPT, Ending
 
 from . import tasks
 
@@ -23,7 +23,8 @@ class Heard:
         self.started: queue.Queue[str] = queue.Queue()
         self.progress: queue.Queue[tuple[str, dict]] = queue.Queue()
         self.ends: queue.Queue[tuple[str, Ending]] = queue.Queue()
-        self.lost: queue.Queue[str] = queue.Queue()
+        self.kept: queue.Queue[tuple[str, str, bytes]] = queue.Queue()
+        self.lost: queue.Queue[tuple[str, bool]] = queue.Queue()
 
     def task_started(self, task):
         self.started.put(task)
@@ -31,11 +32,14 @@ class Heard:
     def task_progressed(self, task, progress):
         self.progress.put((task, dict(progress)))
 
+    def task_kept(self, task, part, data):
+        self.kept.put((task, part, data))
+
     def task_ended(self, task, ending):
         self.ends.put((task, ending))
 
-    def task_lost(self, task):
-        self.lost.put(task)
+    def task_lost(self, task, *, with_worker):
+        self.lost.put((task, with_worker))
 
     def end_of(self, task: str) -> Ending:
         name, ending = self.ends.get(timeout=PATIENCE)
@@ -78,6 +82,20 @@ def test_a_file_comes_back_byte_for_byte(cluster, heard):
     ending = heard.end_of("write")
     assert ending["result"] == {"rows": len(data)}
     assert ending["file"] == data
+
+
+def test_parts_come_back_on_the_way_and_go_out_with_the_next_attempt(cluster, heard):
+    """Byte for byte; what is not small has no place in the scheduler's memory."""
+    data = bytes(range(256))
+    cluster.submit("halfway", tasks.halfway, data, heard)
+    assert heard.end_of("halfway")["state"] == "done"
+    assert heard.kept.get(timeout=PATIENCE) == ("halfway", "half", data)
+    cluster.submit("kept", tasks.kept, None, heard, kept={"half": data})
+    assert heard.end_of("kept")["result"] == {"half": data.hex()}
+    cluster.submit("large", tasks.halfway, bytes(MOST_KEPT + 1), heard)
+    ending = heard.end_of("large")
+    assert ending["error"] is not None
+    assert ending["error"]["code"] == "internal"
 
 
 def test_a_running_task_stops_when_asked(cluster, heard):

@@ -11,7 +11,7 @@ import psutil
 import pytest
 from ridetune.app.errors import OverBudget
 from ridetune.app.identification_job import as_asked, check_budget
-from ridetune.app.jobs import digest
+from ridetune.app.job_kinds import digest
 from ridetune.app.schemas import IdentificationRequest
 from ridetune.app.settings import Limits, Settings
 from ridetune.engine.identification.multistart import fits_of

@@ -186,16 +186,16 @@ def test_parts_are_kept_until_the_job_ends(tmp_path):
     store = Store(tmp_path, Limits())
     session, _ = store.create_session(CAR, [])
     job = queued(store, session)
-    assert store.part_names(job) == []
+    assert store.parts(job) == {}
     assert all(store.keep_part(job, name, name.encode()) for name in "ba")
     assert store.keep_part(job, "a", b"again")
     store.close()
     store = Store(tmp_path, Limits())
-    assert store.part_names(job) == ["a", "b"]
+    assert list(store.parts(job)) == ["a", "b"]
     assert store.part(job, "a") == b"a"
     assert originals(store) == {b"a", b"b"}
     assert store.finish_job(job, "done", file=b"b")
-    assert store.part_names(job) == []
+    assert store.parts(job) == {}
     assert originals(store) == {b"b"}
     assert not store.keep_part(job, "c", b"late")
     assert not store.keep_part("nobody's", "c", b"late")
@@ -213,7 +213,7 @@ def test_parts_go_with_their_job_however_it_goes(store, session, end):
         store.delete_job(session, job)
     elif end == "cancelled":
         store.jobs.ask_to_cancel(session, job)
-        assert store.part_names(job) == []
+        assert store.parts(job) == {}
         store.finish_job(queued(store, session), "failed")
     else:
         store.delete_session(session)

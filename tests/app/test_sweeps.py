@@ -266,15 +266,15 @@ def test_what_goes_to_the_worker_is_everything_it_needs(tmp_path, monkeypatch):
         run = visitor.get("/measurements").json()[0]["id"]
         asked = {"manoeuvre": None, "duration": None, "rims": {"measurement": run}}
         job = submit(visitor, **asked)["id"]
-        until(lambda: job in made[-1].tasks)
-        _, first, _ = made[-1].tasks[job]
+        until(lambda: f"{job}/0-11" in made[-1].tasks)
+        _, first, _ = made[-1].tasks[f"{job}/0-11"]
         assert first["vehicle"] == PAPER
         assert "wheel.fl.z" in first["run"]
         assert visitor.delete(f"/measurements/{run}").status_code == 409
         visitor.put("/vehicle", json={**PAPER, "name": "another"})
     with open_client(settings):
-        until(lambda: job in made[-1].tasks)
-        _, again, _ = made[-1].tasks[job]
+        until(lambda: f"{job}/0-11" in made[-1].tasks)
+        _, again, _ = made[-1].tasks[f"{job}/0-11"]
         assert again["vehicle"] == PAPER
         assert_array_equal(again["run"]["chassis.a_x"], first["run"]["chassis.a_x"])
         assert {name: again[name] for name in again if name != "run"} == {

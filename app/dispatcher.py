@@ -1,0 +1,460 @@
+"""Which job runs when: claims jobs in the database, sends their units, keeps what comes back.
+
+One thread owns all of this state; what the cluster, the leases and the visitors tell comes to it
+through a queue, in order. It writes to the database before it goes on, again and again while that
+is away, so that nothing which was told is lost. Jobs of the highest priority go first, then those
+of the session that has the least under way, then the oldest; as many units run at a time as the
+cluster is wide, so that what is more urgent waits for one unit at most.
+
+A job is at least once: what is not ended by the process that claimed it is claimed by the next, and
+begins with the parts that are kept of it.
+"""
+
+import logging
+import queue
+import secrets
+import threading
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from typing import Any
+
+from ..engine.errors import RideError
+from .cluster import Cluster
+from .errors import NotFound, Unavailable
+from .job_kinds import PATIENT, PROMPT, Kind, Progress
+from .job_store import Beat, Job
+from .store import Store
+from .worker import Ending
+
+log = logging.getLogger(__name__)
+
+GRACE = 2.0
+"""Time that a task which is cancelled has to stop before its worker is killed, s."""
+
+MOST_ATTEMPTS = 3
+LOOK_EVERY = 1.0
+"""Time between two looks at what waits in the database, two heartbeats, and two records of how far
+a job is, s."""
+
+RETRY_AFTER = 2.0
+"""Time after which a cluster or a database that is away is tried again, s."""
+
+AHEAD = 2
+"""Jobs claimed for each task that runs at a time, and as many of those that a person waits for."""
+
+GATHERERS = 2
+
+LAST = ""
+"""The unit that makes the result of all others."""
+
+
+@dataclass
+class _Active:
+    """A job that this process has claimed.
+
+    payload : None until it is gathered
+    waiting : units that are not sent;  running : those that are
+    kept : names of the parts
+    progress : of the units
+    """
+
+    job: Job
+    kind: Kind
+    payload: Any = None
+    waiting: deque[str] = field(default_factory=deque)
+    running: set[str] = field(default_factory=set)
+    kept: set[str] = field(default_factory=set)
+    progress: dict[str, Progress] = field(default_factory=dict)
+    attempts: int = 0
+    started: bool = False
+    cancelled: bool = False
+
+    @property
+    def next(self) -> str | None:
+        """The unit to be sent next, if there is one."""
+        if self.payload is None or self.running and not self.waiting:
+            return None
+        return self.waiting[0] if self.waiting else LAST
+
+    @property
+    def slow(self) -> bool:
+        """Whether its units hold a worker for long."""
+        division = self.kind.division
+        return division is not None and division.slow(self.job.spec)
+
+
+class Closing(Exception):
+    """The service ends; what is not written yet is done again by the next."""
+
+
+class Dispatcher:
+    """The jobs of one service process that are under way."""
+
+    def __init__(
+        self,
+        store: Store,
+        cluster: Cluster,
+        kinds: Mapping[str, Kind],
+        changed: Callable[[str], None],
+        ready: Callable[[], bool],
+    ):
+        """`changed` is told the id of each job that has news, in any thread.
+
+        Jobs are claimed once `ready` returns, and only if it returns True.
+        """
+        self._store = store
+        self._cluster = cluster
+        self._kinds = kinds
+        self._changed = changed
+        self._ready = ready
+        self._owner = secrets.token_hex(8)
+        self._active: dict[str, _Active] = {}
+        self._progress: dict[str, Progress] = {}
+        self._saved: dict[str, Progress] = {}
+        self._looked = self._recorded = self._away_until = 0.0
+        self._width = 1
+        self._news: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._work, name="job-dispatcher", daemon=True)
+        self._heart = threading.Thread(target=self._beat, name="job-leases", daemon=True)
+        self._gatherers = ThreadPoolExecutor(GATHERERS, "job-gatherer")
+        self._canceller = ThreadPoolExecutor(1, "job-canceller")
+
+    def start(self) -> None:
+        """Begin to claim jobs."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop, and hand on what is under way."""
+        self._closing.set()
+        self.look()
+        for executor in (self._gatherers, self._canceller):
+            executor.shutdown(cancel_futures=True)
+        self._cluster.close()
+        for thread in (self._thread, self._heart):
+            if thread.is_alive():
+                thread.join()
+        with suppress(Unavailable):
+            self._store.jobs.release(self._owner)
+
+    def look(self) -> None:
+        """There may be a job to claim."""
+        self._news.put(self._look)
+
+    def cancel(self, job: str) -> None:
+        """Stop a job that is asked to, if it is under way here."""
+        self._news.put(lambda: self._cancel(job))
+
+    def progress(self, job: str) -> Progress | None:
+        """How far a job under way here is."""
+        return self._progress.get(job)
+
+    # What the cluster tells
+
+    def task_started(self, task: str) -> None:
+        """Mark the job as running."""
+        self._hear(task, lambda active, unit: self._started(active))
+
+    def task_progressed(self, task: str, progress: Progress) -> None:
+        """Remember how far it is."""
+        self._hear(task, lambda active, unit: self._tell(active, unit, progress))
+
+    def task_kept(self, task: str, part: str, data: bytes) -> None:
+        """Keep a part that a task made on its way."""
+        self._hear(task, lambda active, unit: self._keep(active, part, data, {}))
+
+    def task_ended(self, task: str, ending: Ending) -> None:
+        """Keep the part or the result."""
+        self._hear(task, lambda active, unit: self._ended(active, unit, ending))
+
+    def task_lost(self, task: str, *, with_worker: bool) -> None:
+        """Send it again, but not for ever where it may be the reason."""
+        self._hear(task, lambda active, unit: self._lost(active, unit, with_worker))
+
+    # The dispatcher's thread
+
+    def _work(self) -> None:
+        if not self._ready():
+            return
+        self._heart.start()
+        while not self._closing.is_set():
+            try:
+                with suppress(queue.Empty):
+                    self._news.get(timeout=LOOK_EVERY)()
+                    while True:
+                        self._news.get_nowait()()
+                self._claim()
+                self._send_all()
+                self._record_progress()
+            except Closing:
+                return
+            except Unavailable as away:
+                log.warning("jobs wait: %s", away)
+                self._closing.wait(RETRY_AFTER)
+            except Exception:
+                log.exception("jobs wait")
+                self._closing.wait(RETRY_AFTER)
+
+    def _hear(self, task: str, then: Callable[[_Active, str], None]) -> None:
+        """Put what a task tells into the queue; of a job that is no longer ours it is nothing."""
+        job, _, unit = task.partition("/")
+
+        def heard() -> None:
+            active = self._active.get(job)
+            if active is None:
+                return
+            try:
+                then(active, unit)
+            except Closing:
+                raise
+            except Exception:
+                log.exception("cannot keep what became of job %s", job)
+                self._fail(active, "internal", "The job failed; see the service's log.")
+            self._changed(job)
+
+        self._news.put(heard)
+
+    def _look(self) -> None:
+        self._looked = 0.0
+
+    def _claim(self) -> None:
+        """Take as many jobs as keep the cluster busy, and have their payloads gathered."""
+        room, least = AHEAD * self._width - len(self._active), PATIENT
+        if room <= 0:
+            room, least = room + AHEAD * self._width, PROMPT
+        now = time.monotonic()
+        if room <= 0 or now - self._looked < LOOK_EVERY:
+            return
+        self._looked = now
+        for job in self._store.jobs.claim(self._owner, room, least_priority=least):
+            active = _Active(job, self._kinds[job.kind], attempts=job.attempts)
+            self._active[job.id] = active
+            self._gatherers.submit(self._gather, active)
+
+    def _gather(self, active: _Active) -> None:
+        """In a thread of its own, because files may have to be read."""
+        job = active.job
+        try:
+            payload = active.kind.payload(job)
+        except RideError as error:
+            code, detail = error.code, str(error)
+            self._news.put(lambda: self._fail(active, code, detail))
+        except Exception:
+            log.exception("cannot gather job %s", job.id)
+            detail = "The job could not be started; see the service's log."
+            self._news.put(lambda: self._fail(active, "internal", detail))
+        else:
+            self._news.put(lambda: self._gathered(active, payload))
+
+    def _gathered(self, active: _Active, payload: Any) -> None:
+        if self._active.get(active.job.id) is not active:
+            return
+        for name, progress in self._written(lambda: self._store.parts(active.job.id)).items():
+            if name.startswith(_KEPT_BY):
+                active.kept.add(name.removeprefix(_KEPT_BY))
+                active.progress[name.removeprefix(_KEPT_BY)] = progress
+        if (division := active.kind.division) is not None:
+            units = division.names(active.job.spec)
+            active.waiting = deque(name for name in units if name not in active.kept)
+        active.payload = payload
+
+    def _send_all(self) -> None:
+        """Send units while there is room; nothing while the workers cannot be reached."""
+        if time.monotonic() < self._away_until or self._choose(any_width=True) is None:
+            return
+        try:
+            self._width = self._cluster.width()
+            while not self._closing.is_set() and (active := self._choose()) is not None:
+                self._send(active)
+        except Unavailable:
+            self._away_until = time.monotonic() + RETRY_AFTER
+
+    def _choose(self, *, any_width: bool = False) -> _Active | None:
+        """The job whose unit is sent next, if there is room."""
+        running = [one for one in self._active.values() for _ in one.running]
+        if len(running) >= self._width and not any_width:
+            return None
+        busy = Counter(one.job.session for one in running)
+        slow = sum(one.slow for one in running) >= max(1, self._width - 1)
+        waiting = (
+            one for one in self._active.values() if one.next is not None and not (slow and one.slow)
+        )
+        return min(
+            waiting,
+            key=lambda one: (-one.job.priority, busy[one.job.session], one.job.created),
+            default=None,
+        )
+
+    def _send(self, active: _Active) -> None:
+        unit, job, kind = active.next, active.job, active.kind
+        assert unit is not None
+        task, payload, kept = kind.task, active.payload, {}
+        try:
+            if unit == LAST:
+                kept = {name: self._store.part(job.id, _KEPT_BY + name) for name in active.kept}
+            else:
+                assert kind.division is not None
+                task, payload = kind.division.unit, {**payload, "unit": unit}
+        except NotFound:
+            # It has ended elsewhere, and its parts went with it.
+            self._let_go(active)
+            return
+        self._cluster.submit(
+            _task(job.id, unit), task, payload, self, kept=kept, priority=job.priority
+        )
+        if unit != LAST:
+            active.waiting.popleft()
+        active.running.add(unit)
+
+    def _started(self, active: _Active) -> None:
+        if not active.started:
+            active.started = True
+            self._written(lambda: self._store.jobs.start(active.job.id, self._owner))
+
+    def _tell(self, active: _Active, unit: str, progress: Progress) -> None:
+        active.progress[unit] = progress
+        division = active.kind.division
+        if division is not None:
+            if unit == LAST:
+                return
+            progress = division.progress(active.job.spec, active.progress, len(active.running))
+        self._progress[active.job.id] = progress
+
+    def _keep(self, active: _Active, part: str, data: bytes, progress: Progress) -> None:
+        name = _KEPT_BY + part
+        if self._written(lambda: self._store.keep_part(active.job.id, name, data, progress)):
+            active.kept.add(part)
+
+    def _ended(self, active: _Active, unit: str, ending: Ending) -> None:
+        active.running.discard(unit)
+        if unit == LAST:
+            self._finish(
+                active,
+                ending["state"],
+                result=ending["result"],
+                error=ending["error"],
+                progress=ending["progress"] or self._progress.get(active.job.id),
+                file=ending.get("file"),
+            )
+        elif ending["state"] == "failed":
+            self._finish(active, "failed", error=ending["error"])
+        elif ending["state"] == "done":
+            progress = ending["result"] or {}
+            self._keep(active, unit, ending.get("file", b""), progress)
+            self._tell(active, unit, progress)
+        elif not active.cancelled:
+            active.waiting.appendleft(unit)
+        self._conclude(active)
+
+    def _lost(self, active: _Active, unit: str, with_worker: bool) -> None:
+        active.running.discard(unit)
+        if active.cancelled:
+            self._conclude(active)
+            return
+        if unit != LAST:
+            active.waiting.appendleft(unit)
+        if with_worker:
+            active.attempts += 1
+            if active.attempts >= MOST_ATTEMPTS:
+                detail = "The job's workers were lost each time it was tried."
+                self._fail(active, "worker-lost", detail)
+                return
+            self._written(lambda: self._store.jobs.requeue(active.job.id, self._owner))
+            active.started = False
+
+    def _cancel(self, job: str) -> None:
+        active = self._active.get(job)
+        if active is None or active.cancelled:
+            return
+        active.cancelled = True
+        active.waiting.clear()
+        self._stop(active)
+        self._conclude(active)
+
+    def _conclude(self, active: _Active) -> None:
+        """End a job that is cancelled once nothing of it runs."""
+        if not active.cancelled or active.running or active.job.id not in self._active:
+            return
+        division = active.kind.division
+        if division is None or not division.cut_short or not active.kept:
+            self._finish(active, "cancelled", progress=self._progress.get(active.job.id))
+
+    def _fail(self, active: _Active, code: str, detail: str) -> None:
+        self._finish(active, "failed", error={"code": code, "detail": detail})
+
+    def _finish(self, active: _Active, state: str, **found: Any) -> None:
+        job = active.job.id
+        if self._active.get(job) is active:
+            self._written(lambda: self._store.finish_job(job, state, **found))
+            self._let_go(active)
+
+    def _let_go(self, active: _Active) -> None:
+        """Forget a job, and stop what still runs of it."""
+        del self._active[active.job.id]
+        for known in (self._progress, self._saved):
+            known.pop(active.job.id, None)
+        self._look()
+        self._stop(active)
+        self._changed(active.job.id)
+
+    def _stop(self, active: _Active) -> None:
+        for unit in active.running:
+            with suppress(RuntimeError):  # none is called while the service ends
+                task = _task(active.job.id, unit)
+                self._canceller.submit(self._cluster.cancel, task, GRACE)
+
+    def _record_progress(self) -> None:
+        now = time.monotonic()
+        if now - self._recorded < LOOK_EVERY:
+            return
+        self._recorded = now
+        for job, progress in self._progress.items():
+            if self._saved.get(job) is not progress:
+                self._store.jobs.save_progress(job, self._owner, progress)
+                self._saved[job] = progress
+
+    def _written(self, write: Callable[[], Any]) -> Any:
+        """What a write gives, as soon as the database takes it."""
+        while not self._closing.is_set():
+            try:
+                return write()
+            except Unavailable as away:
+                log.warning("what became of a job waits to be kept: %s", away)
+                self._closing.wait(RETRY_AFTER)
+        raise Closing
+
+    # The leases' thread
+
+    def _beat(self) -> None:
+        while not self._closing.wait(LOOK_EVERY):
+            if not (known := frozenset(self._active)):
+                continue
+            try:
+                beat = self._store.jobs.heartbeat(self._owner)
+            except Exception as error:
+                log.warning("leases of jobs are not renewed: %s", error)
+                continue
+            if beat.cancel_asked or known - beat.jobs:
+                self._news.put(lambda beat=beat, known=known: self._heed(beat, known))
+
+    def _heed(self, beat: Beat, known: frozenset[str]) -> None:
+        """Stop what others asked to stop, and what is another's by now or has ended."""
+        for job in beat.cancel_asked:
+            self._cancel(job)
+        for job in known - beat.jobs:
+            if (active := self._active.get(job)) is not None:
+                self._let_go(active)
+
+
+def _task(job: str, unit: str) -> str:
+    """What the cluster calls a unit of a job."""
+    return f"{job}/{unit}" if unit else job
+
+
+_KEPT_BY = f"{version('ridetune')}/"
+"""What the names of parts begin with: another version may make them in another way."""

@@ -1,0 +1,248 @@
+"""Which job runs when, what is kept of it, and who goes on with it; the cluster is a stand-in."""
+
+from dataclasses import replace
+
+import pytest
+from ridetune.app import dispatcher as module
+from ridetune.app.dispatcher import Dispatcher
+from ridetune.app.errors import Unavailable
+from ridetune.app.job_kinds import PATIENT, Division, Kind
+from ridetune.app.settings import Limits
+from ridetune.app.store import Store
+from ridetune.app.tables import jobs
+from sqlalchemy import update
+
+from .test_jobs import StandIn, until
+
+WIDTH = StandIn("", None).width()
+MEANWHILE = 5
+"""Units that may end between a job's claim and its first unit: its payload is gathered."""
+
+
+def of_spec(job):
+    return dict(job.spec)
+
+
+def counted(spec, units, at_once):
+    return {"made": sum(one.get("made", 0) for one in units.values()), "of": len(spec["units"])}
+
+
+CUT = Division(names=lambda spec: spec["units"], unit=lambda *_: None, progress=counted)
+KINDS = {
+    "fit": Kind(task=lambda *_: None, payload=of_spec),
+    "sweep": Kind(task=lambda *_: None, payload=of_spec, division=CUT, priority=PATIENT),
+    "campaign": Kind(
+        task=lambda *_: None,
+        payload=of_spec,
+        division=replace(CUT, slow=lambda spec: True, cut_short=True),
+        priority=PATIENT,
+    ),
+}
+
+
+class Team:
+    """Dispatchers on one store, each with a cluster of its own."""
+
+    def __init__(self, path):
+        self.store = Store(path, Limits(unfinished_jobs=100))
+        self.ann, self.bob = (self.store.create_session({}, [])[0] for _ in range(2))
+        self.sessions: dict[str, str] = {}
+        self.dispatchers: list[Dispatcher] = []
+
+    def dispatch(self) -> StandIn:
+        """The cluster of one more."""
+        cluster = StandIn("", None)
+        made = Dispatcher(self.store, cluster, KINDS, lambda job: None, lambda: True)
+        self.dispatchers.append(made)
+        made.start()
+        return cluster
+
+    def submit(self, kind: str, session: str, units: str = "") -> str:
+        spec = {"asked": "", "units": list(units)}
+        priority = KINDS[kind].priority
+        job = self.store.jobs.add(session, kind, spec, None, priority=priority)[0].id
+        self.sessions[job] = session
+        for one in self.dispatchers:
+            one.look()
+        return job
+
+    def state(self, job: str) -> str:
+        return self.store.jobs.get(self.sessions[job], job).state
+
+
+@pytest.fixture
+def team(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "LOOK_EVERY", 0.02)
+    monkeypatch.setattr(module, "RETRY_AFTER", 0.02)
+    team = Team(tmp_path)
+    yield team
+    for one in team.dispatchers:
+        one.close()
+    team.store.close()
+
+
+def make(cluster: StandIn, job: str, unit: str) -> None:
+    """A unit's end: its part is its name."""
+    name = f"{job}/{unit}"
+    until(lambda: name in cluster.tasks)
+    ending = {"state": "done", "result": {"made": 1}, "error": None, "progress": {}}
+    cluster.tasks.pop(name)[2].task_ended(name, {**ending, "file": unit.encode()})
+
+
+def test_units_run_as_many_as_there_are_workers_and_the_result_is_made_of_all(team):
+    cluster = team.dispatch()
+    job = team.submit("sweep", team.ann, "abcde")
+    until(lambda: set(cluster.tasks) == {f"{job}/{unit}" for unit in "abc"})
+    assert [cluster.tasks[f"{job}/{unit}"][1]["unit"] for unit in "abc"] == ["a", "b", "c"]
+    assert WIDTH == 3
+    for unit in "abdce":
+        make(cluster, job, unit)
+    until(lambda: job in cluster.tasks)
+    assert cluster.kept[job] == {unit: unit.encode() for unit in "abcde"}
+    assert team.dispatchers[0].progress(job) == {"made": 5, "of": 5}
+    cluster.end(job, "done", result={"rows": 5})
+    until(lambda: team.state(job) == "done")
+    assert team.store.parts(job) == {}
+
+
+def until_sent(team: Team, cluster: StandIn, task: str) -> None:
+    """Until a unit is sent as others end; how many they are is for the test to say."""
+    job = task.partition("/")[0]
+    until(lambda: team.store.jobs.get(team.sessions[job], job).owner is not None)
+    for _ in range(MEANWHILE):
+        other, unit = next(name for name in cluster.tasks if "/" in name).split("/")
+        make(cluster, other, unit)
+        until(lambda: len(cluster.tasks) == WIDTH)
+        if task in cluster.tasks:
+            return
+    raise AssertionError(f"{task} is not sent before {MEANWHILE} others")
+
+
+def test_what_a_person_waits_for_goes_before_what_takes_as_long_as_it_takes(team):
+    """A fit waits for no more than what runs, however many sweeps came before."""
+    cluster = team.dispatch()
+    for _ in range(4 * WIDTH):
+        team.submit("sweep", team.ann, "abcdefgh")
+    until(lambda: len(cluster.tasks) == WIDTH)
+    until_sent(team, cluster, team.submit("fit", team.ann))
+
+
+def test_sessions_take_turns(team):
+    """One that has nothing under way is not kept waiting by another's many units."""
+    cluster = team.dispatch()
+    team.submit("sweep", team.ann, "abcdefghijklmnopqrstuvwxyz")
+    until(lambda: len(cluster.tasks) == WIDTH)
+    until_sent(team, cluster, f"{team.submit('sweep', team.bob, 'xyz')}/x")
+
+
+def test_slow_units_leave_a_worker_to_others(team):
+    cluster = team.dispatch()
+    slow = team.submit("campaign", team.ann, "abcd")
+    until(lambda: len(cluster.tasks) == WIDTH - 1)
+    fit = team.submit("fit", team.bob)
+    until(lambda: fit in cluster.tasks)
+    cluster.end(fit, "done", result={})
+    until(lambda: team.state(fit) == "done")
+    assert set(cluster.tasks) == {f"{slow}/a", f"{slow}/b"}
+
+
+def test_another_process_goes_on_where_one_stopped(team):
+    """Handed over at a graceful end: only the units that are missing are made again, and how far
+    the others came is known."""
+    first = team.dispatch()
+    job = team.submit("sweep", team.ann, "abcd")
+    for unit in "ab":
+        make(first, job, unit)
+    until(lambda: len(team.store.parts(job)) == 2)
+    team.dispatchers.pop().close()
+    second = team.dispatch()
+    until(lambda: set(second.tasks) == {f"{job}/c", f"{job}/d"})
+    make(second, job, "c")
+    until(lambda: team.dispatchers[0].progress(job) == {"made": 3, "of": 4})
+    make(second, job, "d")
+    until(lambda: job in second.tasks)
+    assert second.kept[job] == {unit: unit.encode() for unit in "abcd"}
+    assert team.store.jobs.get(team.ann, job).restarts == 0
+
+
+def test_parts_of_another_version_are_made_again(team, monkeypatch):
+    job = team.submit("sweep", team.ann, "ab")
+    team.store.keep_part(job, "0.0.1/a", b"old")
+    cluster = team.dispatch()
+    until(lambda: set(cluster.tasks) == {f"{job}/a", f"{job}/b"})
+
+
+def test_what_a_task_keeps_on_its_way_comes_with_its_next_attempt(team):
+    cluster = team.dispatch()
+    fit = team.submit("fit", team.ann)
+    until(lambda: fit in cluster.tasks)
+    cluster.tasks[fit][2].task_kept(fit, "search-0", b"found")
+    cluster.lose(fit, with_worker=True)
+    until(lambda: fit in cluster.tasks)
+    assert cluster.kept[fit] == {"search-0": b"found"}
+
+
+def test_a_cancelled_campaign_makes_its_result_of_what_there_is(team):
+    cluster = team.dispatch()
+    job = team.submit("campaign", team.ann, "abcd")
+    make(cluster, job, "a")
+    until(lambda: f"{job}/c" in cluster.tasks)
+    team.dispatchers[0].cancel(job)
+    until(lambda: job in cluster.tasks)
+    assert cluster.kept[job] == {"a": b"a"}
+    assert set(cluster.cancelled) == {f"{job}/b", f"{job}/c"}
+    cluster.end(job, "cancelled", result={"files": 1})
+    until(lambda: team.state(job) == "cancelled")
+    assert team.store.jobs.get(team.ann, job).result == {"files": 1}
+
+
+def test_a_cancelled_sweep_ends_once_nothing_of_it_runs(team):
+    cluster = team.dispatch()
+    job = team.submit("sweep", team.ann, "abcd")
+    make(cluster, job, "a")
+    team.store.jobs.ask_to_cancel(team.ann, job)  # as another process would
+    until(lambda: team.state(job) == "cancelled")
+    assert cluster.tasks == {}
+
+
+def test_a_unit_that_fails_fails_its_job_alone(team):
+    cluster = team.dispatch()
+    bad, good = team.submit("sweep", team.ann, "ab"), team.submit("sweep", team.bob, "a")
+    until(lambda: f"{bad}/a" in cluster.tasks)
+    error = {"code": "worker-lost", "detail": "It killed its workers."}
+    cluster.end(f"{bad}/a", "failed", error=error)
+    until(lambda: team.state(bad) == "failed")
+    until(lambda: f"{bad}/b" in cluster.cancelled)
+    assert team.store.jobs.get(team.ann, bad).error == error
+    make(cluster, good, "a")
+    until(lambda: good in cluster.tasks)
+
+
+def test_a_job_whose_lease_another_took_is_let_go(team):
+    """As after a pause longer than the lease."""
+    cluster = team.dispatch()
+    fit = team.submit("fit", team.ann)
+    until(lambda: fit in cluster.tasks)
+    with team.store.database.writing() as connection:
+        connection.execute(update(jobs).values(owner="another"))
+    until(lambda: fit in cluster.cancelled)
+    assert team.state(fit) == "queued"
+
+
+def test_nothing_that_was_told_is_lost_while_the_database_is_away(team, monkeypatch):
+    cluster = team.dispatch()
+    fit = team.submit("fit", team.ann)
+    until(lambda: fit in cluster.tasks)
+    finish, refused = team.store.finish_job, []
+
+    def away(*told, **found):
+        refused.append(told)
+        if len(refused) < 4:
+            raise Unavailable("The database cannot be reached.")
+        return finish(*told, **found)
+
+    monkeypatch.setattr(team.store, "finish_job", away)
+    cluster.end(fit, "done", result={"cost": 1.0})
+    until(lambda: team.state(fit) == "done")
+    assert len(refused) == 4
+    assert team.store.jobs.get(team.ann, fit).result == {"cost": 1.0}
