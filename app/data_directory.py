@@ -12,10 +12,10 @@ ended.
 """
 
 import fcntl
-import hashlib
 import os
+import secrets
 import shutil
-from collections.abc import Collection
+from collections.abc import Iterator
 from pathlib import Path
 
 from .errors import StartError
@@ -70,36 +70,37 @@ class DataDirectory:
         """Place of an original."""
         return self.originals / sha256[:2] / sha256
 
-    def keep(self, data: bytes) -> str:
-        """Write an original so that it survives a power cut; its SHA-256."""
-        sha256 = hashlib.sha256(data).hexdigest()
+    def keep(self, sha256: str, data: bytes) -> None:
+        """Write an original so that it survives a power cut, unless it is there."""
         place = self.original(sha256)
         if place.exists():
-            return sha256
+            return
         place.parent.mkdir(exist_ok=True)
-        beside = place.with_suffix(".tmp")
-        with open(beside, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(beside, place)
+        beside = place.with_suffix(f".{secrets.token_hex(4)}.tmp")
+        try:
+            with open(beside, "wb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(beside, place)
+        except OSError:
+            beside.unlink(missing_ok=True)
+            raise
         for folder in (place.parent, self.originals):
             _flush_folder(folder)
-        return sha256
 
-    def drop(self, sha256: str) -> None:
-        """Remove an original that nothing refers to any more."""
-        self.original(sha256).unlink(missing_ok=True)
+    def names(self) -> Iterator[str]:
+        """The originals by their SHA-256, and what was written of some."""
+        return (file.name for file in self.originals.glob("*/*"))
 
-    def sweep(self, kept: Collection[str]) -> None:
-        """Remove what a crash left behind: half-written files, originals without a row, and what
-        was being read.
-        """
+    def drop(self, name: str) -> None:
+        """Remove one of them."""
+        self.original(name).unlink(missing_ok=True)
+
+    def sweep(self) -> None:
+        """Remove what was being read in a crash."""
         shutil.rmtree(self.reading, ignore_errors=True)
         self.reading.mkdir(exist_ok=True)
-        for file in self.originals.glob("*/*"):
-            if file.name not in kept:
-                file.unlink(missing_ok=True)
 
     def close(self) -> None:
         """Give up the folder."""

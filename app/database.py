@@ -5,6 +5,7 @@ write lock at its start (BEGIN IMMEDIATE), so it waits for its turn instead of f
 """
 
 import time
+from collections.abc import Collection
 from contextlib import AbstractContextManager
 from itertools import chain
 from pathlib import Path
@@ -53,6 +54,12 @@ class Database:
     def writing(self) -> AbstractContextManager[Connection]:
         """Transaction that commits durably at its end, or leaves no trace."""
         return self._writer.begin()
+
+    def lock(self, connection: Connection, names: Collection[str]) -> None:
+        """Hold what the names stand for to the end of a writing transaction.
+
+        Here nobody else can write before that anyway.
+        """
 
     @property
     def now(self) -> ColumnElement[float]:
