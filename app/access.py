@@ -21,7 +21,7 @@ COOKIE_SECONDS = 400 * 24 * 3600
 def session_of(connection: HTTPConnection, sid: str) -> str:
     """The session's id if the caller holds its token; NotFound otherwise."""
     token = bearer(connection) or connection.cookies.get(COOKIE + sid, "")
-    if not token or not services_of(connection).store.holds(sid, token):
+    if not token or not services_of(connection).store.sessions.holds(sid, token):
         raise NotFound("There is no such session, or it is not yours; open the start page.")
     return sid
 
@@ -31,7 +31,7 @@ def own_session(request: Request) -> str | None:
     store = services_of(request).store
     for name, token in reversed(request.cookies.items()):
         sid = name.removeprefix(COOKIE)
-        if sid != name and store.holds(sid, token):
+        if sid != name and store.sessions.holds(sid, token):
             return sid
     return None
 
@@ -55,7 +55,9 @@ def require_service_token(connection: HTTPConnection, token: str) -> None:
 def give_session(connection: HTTPConnection, response: Response) -> tuple[str, str]:
     """Id and token of a fresh session, its cookie set on the response."""
     project = sample_project()
-    sid, token = services_of(connection).store.create_session(project.vehicle, project.measurements)
+    sid, token = services_of(connection).store.sessions.create(
+        project.vehicle, project.measurements
+    )
     response.set_cookie(
         COOKIE + sid,
         token,

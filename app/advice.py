@@ -42,7 +42,7 @@ def advice(
             f"{limits.advised_seconds:g} s; name fewer or shorter ones."
         )
     if fitted is None:
-        data = store.session(session).vehicle if request.vehicle is None else request.vehicle
+        data = store.sessions.get(session).vehicle if request.vehicle is None else request.vehicle
         vehicle = vehicle_from_json(data)
         found = advise_unmeasured(
             vehicle, candidates, planned=request.planned, noise=_checked(request.noise)

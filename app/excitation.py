@@ -16,9 +16,10 @@ from ..engine.simulation.recorded_motion import RecordedMotion, recorded_motion
 from ..engine.simulation.simulate import SAMPLE_STEP, default_step
 from ..engine.vehicle import Vehicle
 from .errors import InvalidRequest, NotFound
+from .measurement_store import Measurement
 from .recordings import Recordings, with_braking
 from .schemas import ExcitationForm
-from .store import Measurement, Store
+from .store import Store
 
 Mode = Literal["manoeuvre", "rims", "posts"]
 MODES: tuple[Mode, ...] = ("manoeuvre", "rims", "posts")
@@ -57,7 +58,7 @@ def mode_of(request: ExcitationForm) -> Mode:
 def recording_of(request: ExcitationForm, session: str, store: Store) -> Measurement | None:
     """The measurement that moves the car, if one does."""
     asked = request.rims or request.posts
-    return None if asked is None else store.measurement(session, asked.measurement)
+    return None if asked is None else store.measurements.get(session, asked.measurement)
 
 
 def manoeuvre_of(request: ExcitationForm) -> Manoeuvre:

@@ -32,8 +32,9 @@ from sqlalchemy import (
 
 from .database import Database
 from .errors import Busy, InvalidRequest, NotFound
+from .session_row import lock_session, mark_used
 from .settings import Limits
-from .tables import job_files, job_parts, jobs, results, sessions
+from .tables import job_files, job_parts, jobs, results
 
 UNFINISHED = ("queued", "running")
 LEASE = 10.0
@@ -108,6 +109,7 @@ class JobStore:
         spec : with `asked`, see `known`
         """
         with self._database.writing() as connection:
+            lock_session(connection, session)
             if (known := _known(connection, session, key, spec["asked"])) is not None:
                 return known, False
             mine = jobs.c.session == session
@@ -136,7 +138,7 @@ class JobStore:
                     priority=priority,
                 )
             )
-            connection.execute(update(sessions).where(sessions.c.id == session).values(used=True))
+            mark_used(connection, session)
             return _job(connection.execute(_select(jobs.c.id == job)).one()), True
 
     def known(self, session: str, key: str | None, asked: str) -> Job | None:
@@ -169,12 +171,16 @@ class JobStore:
 
     def unfinished(self, session: str | None = None) -> list[Job]:
         """Jobs that are queued or running, oldest first."""
+        with self._database.reading() as connection:
+            return self.unfinished_in(connection, session)
+
+    def unfinished_in(self, connection: Connection, session: str | None = None) -> list[Job]:
+        """The same within a transaction."""
         conditions: list[Any] = [jobs.c.state.in_(UNFINISHED)]
         if session is not None:
             conditions.append(jobs.c.session == session)
-        with self._database.reading() as connection:
-            query = _select(*conditions).order_by(jobs.c.created)
-            return [_job(row) for row in connection.execute(query)]
+        query = _select(*conditions).order_by(jobs.c.created)
+        return [_job(row) for row in connection.execute(query)]
 
     def claim(self, owner: str, most: int, *, least_priority: int = 0) -> list[Job]:
         """Make unfinished jobs that nobody runs the owner's, `most` at once, those of the highest
@@ -190,6 +196,7 @@ class JobStore:
         )
         free &= jobs.c.priority >= least_priority
         with self._database.reading() as connection:
+            # Mostly there is none, and nobody's writing is held up.
             if connection.execute(select(jobs.c.id).where(free).limit(1)).first() is None:
                 return []
         with self._database.writing() as connection:
@@ -264,8 +271,9 @@ class JobStore:
             self._cancel(connection, connection.execute(unowned).scalars().all())
         return self.get(session, job)
 
-    def finish(
+    def finish_in(
         self,
+        connection: Connection,
         job: str,
         state: str,
         *,
@@ -274,8 +282,8 @@ class JobStore:
         progress: Mapping[str, Any] | None = None,
         file: str | None = None,
     ) -> bool:
-        """Give a job its final state, with its result in the same commit, in which its parts go;
-        False if it had one.
+        """Give a job its final state within a transaction, in which its result comes and its parts
+        go; False if it had one.
 
         file : SHA-256 of what it made, which is kept already
         """
@@ -284,17 +292,17 @@ class JobStore:
             values["error"] = json.dumps(dict(error))
         if progress is not None:
             values["progress"] = json.dumps(dict(progress))
-        with self._database.writing() as connection:
-            ended = connection.execute(
-                update(jobs).where(jobs.c.id == job, jobs.c.state.in_(UNFINISHED)).values(**values)
-            )
-            if ended.rowcount and result is not None:
-                connection.execute(insert(results).values(job=job, body=json.dumps(dict(result))))
-            if ended.rowcount:
-                connection.execute(delete(job_parts).where(job_parts.c.job == job))
-            if ended.rowcount and file is not None:
-                connection.execute(insert(job_files).values(job=job, sha256=file))
-        return bool(ended.rowcount)
+        ended = connection.execute(
+            update(jobs).where(jobs.c.id == job, jobs.c.state.in_(UNFINISHED)).values(**values)
+        )
+        if not ended.rowcount:
+            return False
+        if result is not None:
+            connection.execute(insert(results).values(job=job, body=json.dumps(dict(result))))
+        if file is not None:
+            connection.execute(insert(job_files).values(job=job, sha256=file))
+        connection.execute(delete(job_parts).where(job_parts.c.job == job))
+        return True
 
     def save_progress(self, job: str, owner: str, progress: Mapping[str, Any]) -> None:
         """Keep how far its owner's job has come."""

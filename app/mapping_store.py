@@ -2,14 +2,16 @@
 
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
-from sqlalchemy import Connection, delete, func, insert, select, update
+from sqlalchemy import delete, func, insert, select
 
 from .database import Database
 from .errors import Busy, NotFound
-from .tables import mappings, sessions
+from .file_store import FileStore
+from .session_row import lock_session, mark_used
+from .tables import mappings
 
 MOST = 100
 """Mappings of one session."""
@@ -18,9 +20,9 @@ MOST = 100
 class MappingStore:
     """The mappings of all sessions, as JSON."""
 
-    def __init__(self, database: Database, require_room: Callable[[Connection, str, int], None]):
+    def __init__(self, database: Database, files: FileStore):
         self._database = database
-        self._require_room = require_room
+        self._files = files
 
     def of_session(self, session: str) -> dict[str, dict[str, Any]]:
         """By name, the newest first."""
@@ -36,17 +38,18 @@ class MappingStore:
         """Keep one, in place of that which has its name; `Busy` where there is no room."""
         body, mine = json.dumps(dict(mapping)), mappings.c.session == session
         with self._database.writing() as connection:
+            lock_session(connection, session)
             connection.execute(delete(mappings).where(mine, mappings.c.name == name))
             count = connection.execute(
                 select(func.count()).select_from(mappings).where(mine)
             ).scalar_one()
             if count >= MOST:
                 raise Busy(f"The session already keeps {count} mappings; delete one first.")
-            self._require_room(connection, session, len(body))
+            self._files.require_room_in(connection, session, len(body))
             connection.execute(
                 insert(mappings).values(session=session, name=name, body=body, created=time.time())
             )
-            connection.execute(update(sessions).where(sessions.c.id == session).values(used=True))
+            mark_used(connection, session)
 
     def delete(self, session: str, name: str) -> None:
         """Remove one."""

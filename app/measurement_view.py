@@ -4,14 +4,15 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Any
 
-from .store import Measurement, Store
+from .measurement_store import Measurement
+from .store import Store
 
 
 def measurements_to_json(
     store: Store, sid: str, kept: Sequence[Measurement] | None = None
 ) -> list[dict[str, Any]]:
     """Those of a session that are told, or all, oldest first."""
-    of_session = store.measurements(sid)
+    of_session = store.measurements.of_session(sid)
     keys = data_keys(of_session)
     oldest: dict[str, Measurement] = {}
     for one in of_session:

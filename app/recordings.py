@@ -26,7 +26,8 @@ from ..engine.run_notes import doubtful_noise
 from ..engine.simulation.rims_settings import RimsSettings
 from ..engine.step_record import step_records_from_json
 from .errors import Deleted, NotFound
-from .store import Measurement, NewMeasurement, Store
+from .measurement_store import Measurement, NewMeasurement
+from .store import Store
 
 if TYPE_CHECKING:
     from ..engine.formats.child import Bounds, ChildTable
@@ -135,7 +136,7 @@ class Recordings:
 
     def table(self, measurement: Measurement) -> "AbstractContextManager[ChildTable]":
         """The file as a table, for as long as the `with` lasts."""
-        return self._opened(self._store.original(measurement), measurement.name)
+        return self._opened(self._store.measurements.original(measurement), measurement.name)
 
     def parse(self, measurement: Measurement, noise: Mapping[str, float] | None = None) -> Run:
         """Read a measurement's file under its mapping; MeasurementError says what is wrong with it
@@ -281,7 +282,7 @@ def as_stated(
 ) -> Measurement:
     """A measurement as it was when a job kept that of it; Deleted names it by its role."""
     try:
-        measurement = store.measurement(session, kept["id"])
+        measurement = store.measurements.get(session, kept["id"])
     except NotFound:
         raise Deleted(f"{kept['name']}, {role}, was deleted; add it again and {remedy}.") from None
     # Jobs of an earlier service say nothing of these, and its sweeps nothing of noise.

@@ -16,10 +16,10 @@ from .errors import Conflict, NotFound
 from .job_kinds import as_asked
 from .job_routes import View, job_router, submitted
 from .job_store import Job
+from .measurement_store import Measurement, NewMeasurement
 from .measurement_view import measurements_to_json
 from .schemas import CampaignRequest
 from .services import Services, Shared
-from .store import Measurement, NewMeasurement
 
 ASKED = (
     *("plant", "manoeuvres", "class_factor", "band", "road_seed"),
@@ -56,8 +56,8 @@ async def submit(sid: SessionId, services: Shared, body: CampaignRequest) -> dic
 def _spec(services: Services, sid: str, body: CampaignRequest) -> dict[str, Any]:
     """Everything that the job needs, checked."""
     store = services.store
-    spec = check_and_fill(body, store.session(sid).vehicle, services.settings.limits)
-    store.require_room(sid, spec.pop("most_bytes"))
+    spec = check_and_fill(body, store.sessions.get(sid).vehicle, services.settings.limits)
+    store.files.require_room(sid, spec.pop("most_bytes"))
     return spec
 
 
@@ -105,9 +105,9 @@ def _taken(services: Services, sid: str, jid: str) -> list[Measurement]:
     whole = [one for one in _result(job)["recordings"] if one["state"] == "whole"]
     if not whole:
         raise Conflict("The campaign has no whole recording; see why, and drive again.")
-    held = {one.sha256: one for one in store.measurements(sid)}
+    held = {one.sha256: one for one in store.measurements.of_session(sid)}
     new = [_recorded(services, job, one) for one in whole if one["sha256"] not in held]
-    held |= {one.sha256: one for one in store.add_measurements(sid, new)}
+    held |= {one.sha256: one for one in store.measurements.add_all(sid, new)}
     return [held[one["sha256"]] for one in whole]
 
 

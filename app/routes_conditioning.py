@@ -6,10 +6,10 @@ from typing import Any
 from fastapi import APIRouter
 
 from .access import SessionId
+from .measurement_store import Measurement
 from .measurement_view import measurement_to_json
 from .schemas import ConditioningRequest
 from .services import Services, Shared
-from .store import Measurement
 from .strict_json import StrictRoute
 
 router = APIRouter(
@@ -23,7 +23,7 @@ router = APIRouter(
 async def conditioning(sid: SessionId, mid: str, services: Shared) -> dict[str, Any]:
     """The steps in force, what each of them did, and those that the recording calls for."""
     return await services.readers.run(
-        sid, lambda: _shown(services, sid, services.store.measurement(sid, mid))
+        sid, lambda: _shown(services, sid, services.store.measurements.get(sid, mid))
     )
 
 
@@ -40,18 +40,22 @@ def _condition(services: Services, sid: str, mid: str, body: ConditioningRequest
     from ..engine.conditioning.chain import needs_vehicle, steps_from_json, steps_to_json
     from ..engine.vehicle_file import vehicle_from_json, vehicle_to_json
 
-    kept = services.store.measurement(sid, mid)
+    kept = services.store.measurements.get(sid, mid)
     steps = steps_from_json(body.steps)
     asked = None
     if steps:
         vehicle = None
         if needs_vehicle(steps):
-            told = services.store.session(sid).vehicle if body.vehicle is None else body.vehicle
+            told = (
+                services.store.sessions.get(sid).vehicle if body.vehicle is None else body.vehicle
+            )
             vehicle = vehicle_to_json(vehicle_from_json(told))
         asked = {"steps": steps_to_json(steps), "vehicle": vehicle}
     done = replace(kept, conditioning=asked)
     found = services.recordings.summed_up(done)
-    return _shown(services, sid, services.store.set_conditioning(sid, kept.id, asked, found))
+    return _shown(
+        services, sid, services.store.measurements.set_conditioning(sid, kept.id, asked, found)
+    )
 
 
 def _shown(services: Services, sid: str, kept: Measurement) -> dict[str, Any]:
@@ -63,7 +67,7 @@ def _shown(services: Services, sid: str, kept: Measurement) -> dict[str, Any]:
     from ..engine.vehicle_file import vehicle_from_json
 
     in_force = kept.conditioning or {"steps": [], "vehicle": None}
-    vehicle = vehicle_from_json(services.store.session(sid).vehicle)
+    vehicle = vehicle_from_json(services.store.sessions.get(sid).vehicle)
     raw = services.recordings.raw(kept)
     found = suggest(raw, vehicle)
     run = services.recordings.run(kept)

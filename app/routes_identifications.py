@@ -46,7 +46,7 @@ async def submit(sid: SessionId, services: Shared, body: IdentificationRequest) 
 
 def _spec(services: Services, sid: str, body: IdentificationRequest) -> dict[str, Any]:
     """Everything that the job needs, checked."""
-    kept = [services.store.measurement(sid, measurement) for measurement in body.runs]
+    kept = [services.store.measurements.get(sid, measurement) for measurement in body.runs]
     check_budget(
         kept,
         body.settings.step,
@@ -54,7 +54,7 @@ def _spec(services: Services, sid: str, body: IdentificationRequest) -> dict[str
         starts=body.starts,
         fit_noise=body.fit_noise,
     )
-    vehicle = services.store.session(sid).vehicle if body.vehicle is None else body.vehicle
+    vehicle = services.store.sessions.get(sid).vehicle if body.vehicle is None else body.vehicle
     spec = body.model_dump(mode="json", exclude={"key", "runs", "vehicle"})
     spec["vehicle"] = vehicle_to_json(vehicle_from_json(vehicle))
     spec["runs"] = [stated(one) for one in kept]

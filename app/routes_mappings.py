@@ -12,10 +12,10 @@ from .access import SessionId
 from .columns import candidate_to_json, columns_to_json, preview
 from .downloads import saved_as
 from .errors import NotFound
+from .measurement_store import Measurement
 from .measurement_view import measurement_to_json
 from .schemas import JsonObject, NamedMapping
 from .services import Services, Shared
-from .store import Measurement
 from .strict_json import StrictRoute
 
 MOST_SHOWN = 20
@@ -35,7 +35,7 @@ async def columns(sid: SessionId, mid: str, services: Shared) -> dict[str, Any]:
 def _columns(services: Services, sid: str, mid: str) -> dict[str, Any]:
     from ..engine.mapping.mapping import mapping_from_json
 
-    kept = services.store.measurement(sid, mid)
+    kept = services.store.measurements.get(sid, mid)
     templates = {
         name: mapping_from_json(one, name)
         for name, one in services.store.mappings.of_session(sid).items()
@@ -49,7 +49,7 @@ async def candidate(
     sid: SessionId, mid: str, services: Shared, index: int, channel: str
 ) -> dict[str, Any]:
     """A column as a channel that a person chooses for it: its unit and sign, and why."""
-    kept = services.store.measurement(sid, mid)
+    kept = services.store.measurements.get(sid, mid)
     return await services.readers.run(
         sid, lambda: candidate_to_json(services.recordings.survey(kept), index, channel)
     )
@@ -64,7 +64,7 @@ async def columns_preview(
     points: Annotated[int, Query(ge=2, le=5000)] = 500,
 ) -> list[dict[str, Any]]:
     """Least and greatest value of some columns in stretches of equally many samples."""
-    kept = services.store.measurement(sid, mid)
+    kept = services.store.measurements.get(sid, mid)
 
     def shown() -> list[dict[str, Any]]:
         with services.recordings.table(kept) as table:
@@ -76,7 +76,7 @@ async def columns_preview(
 @router.get("/measurements/{mid}/mapping", response_class=Response)
 def mapping(sid: SessionId, mid: str, services: Shared) -> Response:
     """The mapping that holds, as a file for other recordings and for the command line."""
-    kept = services.store.measurement(sid, mid)
+    kept = services.store.measurements.get(sid, mid)
     if kept.mapping is None:
         raise NotFound(f"{kept.name} has no mapping; its columns go by their own names.")
     text = json.dumps(kept.mapping, indent=2, ensure_ascii=False) + "\n"
@@ -97,13 +97,13 @@ async def set_mapping(
 def _map(services: Services, sid: str, mid: str, body: JsonObject) -> Measurement:
     from ..engine.mapping.mapping import mapping_from_json, mapping_to_json
 
-    services.store.require_unused(sid, mid)
-    kept = services.store.measurement(sid, mid)
+    services.store.measurements.require_unused(sid, mid)
+    kept = services.store.measurements.get(sid, mid)
     mapping = mapping_to_json(mapping_from_json(body, "mapping"))
     mapped = replace(kept, mapping=mapping)
     noise = dict(services.recordings.parse(mapped, kept.noise).noise)
     found = services.recordings.summed_up(replace(mapped, noise=noise))
-    return services.store.set_mapping(sid, kept.id, mapping, noise, found)
+    return services.store.measurements.set_mapping(sid, kept.id, mapping, noise, found)
 
 
 @router.delete("/measurements/{mid}/mapping")
@@ -111,13 +111,13 @@ async def forget_mapping(sid: SessionId, mid: str, services: Shared) -> dict[str
     """Go by the names of the file's columns again."""
 
     def by_names() -> Measurement:
-        services.store.require_unused(sid, mid)
-        kept = services.store.measurement(sid, mid)
+        services.store.measurements.require_unused(sid, mid)
+        kept = services.store.measurements.get(sid, mid)
         found, noise = services.recordings.by_names(kept)
         if not found["needs_mapping"]:
             bare = replace(kept, mapping=None, noise=noise, summary=found)
             found = services.recordings.summed_up(bare)
-        return services.store.set_mapping(sid, kept.id, None, noise, found)
+        return services.store.measurements.set_mapping(sid, kept.id, None, noise, found)
 
     named = await services.readers.run(sid, by_names)
     return measurement_to_json(services.store, sid, named)

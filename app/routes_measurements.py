@@ -15,11 +15,11 @@ from ..engine.step_record import step_record_to_json
 from . import frames
 from .access import SessionId
 from .downloads import saved_as
+from .measurement_store import Measurement
 from .measurement_view import measurement_to_json, measurements_to_json
 from .recordings import named_car
 from .routes_simulations import csv_reply, described, frames_reply
 from .services import Services, Shared
-from .store import Measurement
 from .strict_json import StrictRoute
 from .uploads import Upload, openapi, receive
 
@@ -44,7 +44,7 @@ async def upload(sid: SessionId, services: Shared, received: Recording) -> dict[
 
 def _keep(services: Services, sid: str, received: Upload) -> Measurement:
     data = received.read(services.settings.limits.upload_bytes)
-    return services.store.add_measurement(sid, services.recordings.recorded(data, received.name))
+    return services.store.measurements.add(sid, services.recordings.recorded(data, received.name))
 
 
 @router.get("")
@@ -56,7 +56,7 @@ def all_of_session(sid: SessionId, services: Shared) -> list[dict[str, Any]]:
 @router.get("/{mid}")
 def one(sid: SessionId, mid: str, services: Shared) -> dict[str, Any]:
     """One measurement: what was found in it."""
-    return measurement_to_json(services.store, sid, services.store.measurement(sid, mid))
+    return measurement_to_json(services.store, sid, services.store.measurements.get(sid, mid))
 
 
 @router.get("/{mid}/frames", responses=described(frames.HISTORIES), response_class=Response)
@@ -75,7 +75,7 @@ async def histories(
     """The recording's histories in SI: binary or JSON."""
     form = frames.form_of(request.headers.get("accept"), frames.HISTORIES)
     names = None if channels is None else [name for name in channels.split(",") if name]
-    kept = services.store.measurement(sid, mid)
+    kept = services.store.measurements.get(sid, mid)
     if not conditioned:
         kept = replace(kept, conditioning=None)
 
@@ -96,7 +96,7 @@ async def as_csv(
     sid: SessionId, mid: str, services: Shared, conditioned: Conditioned = True
 ) -> Response:
     """The recording as it is used, in SI and by our channels' names, as a file."""
-    kept = services.store.measurement(sid, mid)
+    kept = services.store.measurements.get(sid, mid)
     if not conditioned:
         kept = replace(kept, conditioning=None)
     run = await services.readers.run(sid, lambda: services.recordings.run(kept))
@@ -106,7 +106,7 @@ async def as_csv(
 @router.get("/{mid}/run.toml", response_class=Response)
 async def its_notes(sid: SessionId, mid: str, services: Shared) -> Response:
     """The notes that belong beside `run.csv`: its noise, and what was done to it."""
-    kept = services.store.measurement(sid, mid)
+    kept = services.store.measurements.get(sid, mid)
     run = await services.readers.run(sid, lambda: services.recordings.run(kept))
     return Response(
         notes_of(run), media_type="application/toml", headers=saved_as(kept.name, "run.toml")
@@ -116,9 +116,9 @@ async def its_notes(sid: SessionId, mid: str, services: Shared) -> Response:
 @router.get("/{mid}/original", response_class=FileResponse)
 def original(sid: SessionId, mid: str, services: Shared) -> FileResponse:
     """The uploaded file, byte for byte."""
-    kept = services.store.measurement(sid, mid)
+    kept = services.store.measurements.get(sid, mid)
     return FileResponse(
-        services.store.original(kept),
+        services.store.measurements.original(kept),
         filename=kept.name,
         media_type="application/octet-stream",
     )
@@ -132,7 +132,7 @@ async def set_notes(sid: SessionId, mid: str, services: Shared, received: Notes)
 
 
 def _note(services: Services, sid: str, mid: str, received: Upload) -> Measurement:
-    kept = services.store.measurement(sid, mid)
+    kept = services.store.measurements.get(sid, mid)
     data = received.read(services.settings.limits.body_bytes)
     notes = parse_notes(data, received.name)
     noise, done = dict(notes.noise), [step_record_to_json(one) for one in notes.conditioning]
@@ -145,11 +145,11 @@ def _note(services: Services, sid: str, mid: str, received: Upload) -> Measureme
         )
     told = {**kept.summary, **named_car(car, kept.summary)}
     if kept.summary.get("needs_mapping"):
-        return services.store.set_notes(sid, kept.id, noise, done, told)
+        return services.store.measurements.set_notes(sid, kept.id, noise, done, told)
     known = dict(services.recordings.parse(kept, noise).noise)
     noted = replace(kept, noise=known, conditioned=done or None, summary=told)
     found = services.recordings.summed_up(noted)
-    return services.store.set_notes(sid, kept.id, known, done, found)
+    return services.store.measurements.set_notes(sid, kept.id, known, done, found)
 
 
 @router.put("/{mid}/manoeuvre", openapi_extra=openapi("application/json"))
@@ -157,9 +157,11 @@ async def set_manoeuvre(
     sid: SessionId, mid: str, services: Shared, received: Driven
 ) -> dict[str, Any]:
     """Take what was driven from a manoeuvre file, as the NAME.manoeuvre.json beside it."""
-    services.store.measurement(sid, mid)
+    services.store.measurements.get(sid, mid)
     driven = await run_in_threadpool(_driven, services, received)
-    return measurement_to_json(services.store, sid, services.store.set_manoeuvre(sid, mid, driven))
+    return measurement_to_json(
+        services.store, sid, services.store.measurements.set_manoeuvre(sid, mid, driven)
+    )
 
 
 def _driven(services: Services, received: Upload) -> dict[str, Any]:
@@ -178,11 +180,13 @@ def _driven(services: Services, received: Upload) -> dict[str, Any]:
 @router.delete("/{mid}/manoeuvre")
 def forget_manoeuvre(sid: SessionId, mid: str, services: Shared) -> dict[str, Any]:
     """What was driven is not known."""
-    services.store.measurement(sid, mid)
-    return measurement_to_json(services.store, sid, services.store.set_manoeuvre(sid, mid, None))
+    services.store.measurements.get(sid, mid)
+    return measurement_to_json(
+        services.store, sid, services.store.measurements.set_manoeuvre(sid, mid, None)
+    )
 
 
 @router.delete("/{mid}", status_code=204)
 def delete(sid: SessionId, mid: str, services: Shared) -> None:
     """Remove a measurement; refused while an identification reads it."""
-    services.store.delete_measurement(sid, mid)
+    services.store.measurements.delete(sid, mid)

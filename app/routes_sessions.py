@@ -31,7 +31,7 @@ def create(request: Request, response: Response) -> dict[str, str]:
 @router.get("/{sid}")
 def read(sid: SessionId, services: Shared) -> dict[str, Any]:
     """Everything in the session, results of its jobs apart."""
-    session = services.store.session(sid)
+    session = services.store.sessions.get(sid)
     return {
         "id": sid,
         "vehicle": session.vehicle,
@@ -49,42 +49,42 @@ def delete(sid: SessionId, services: Shared, response: Response) -> None:
     services.jobs.cancel_all(sid)
     if services.viewers is not None:
         services.viewers.stop(sid)
-    services.store.delete_session(sid)
+    services.store.sessions.delete(sid)
     response.delete_cookie(COOKIE + sid)
 
 
 @router.get("/{sid}/vehicle")
 def vehicle(sid: SessionId, services: Shared) -> dict[str, Any]:
     """The car being tuned."""
-    return services.store.session(sid).vehicle
+    return services.store.sessions.get(sid).vehicle
 
 
 @router.put("/{sid}/vehicle")
 def set_vehicle(sid: SessionId, services: Shared, body: VehicleBody) -> dict[str, Any]:
     """Replace the car being tuned; a fit.json is taken too, for its vehicle."""
     checked = vehicle_to_json(vehicle_from_json(body))
-    services.store.set_vehicle(sid, checked)
+    services.store.sessions.set_vehicle(sid, checked)
     return checked
 
 
 @router.get("/{sid}/baseline")
 def baseline(sid: SessionId, services: Shared) -> dict[str, Any]:
     """The car it is compared with."""
-    return services.store.session(sid).baseline
+    return services.store.sessions.get(sid).baseline
 
 
 @router.put("/{sid}/baseline")
 def set_baseline(sid: SessionId, services: Shared, body: VehicleBody) -> dict[str, Any]:
     """Replace the car it is compared with."""
     checked = vehicle_to_json(vehicle_from_json(body))
-    services.store.set_baseline(sid, checked)
+    services.store.sessions.set_baseline(sid, checked)
     return checked
 
 
 @router.get("/{sid}/setup")
 def setup(sid: SessionId, services: Shared) -> dict[str, Any] | None:
     """What the page will ask of the next identification; null while nothing was chosen."""
-    return services.store.session(sid).setup
+    return services.store.sessions.get(sid).setup
 
 
 @router.patch("/{sid}/setup")

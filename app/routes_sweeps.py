@@ -54,10 +54,10 @@ def _spec(services: Services, sid: str, body: SweepRequest) -> dict[str, Any]:
 
     mode_of(body)
     store = services.store
-    vehicle = store.session(sid).vehicle if body.vehicle is None else body.vehicle
+    vehicle = store.sessions.get(sid).vehicle if body.vehicle is None else body.vehicle
     kept = recording_of(body, sid, store)
     spec = check_and_fill(body, vehicle, kept, services.recordings, services.settings.limits)
-    store.require_room(sid, most_bytes(body))
+    store.files.require_room(sid, most_bytes(body))
     return spec
 
 

@@ -41,7 +41,7 @@ def _spec(services: Services, sid: str, body: ValidationRequest) -> dict[str, An
     fitted = services.jobs.get(sid, body.identification, IDENTIFICATION)
     store, limits = services.store, services.settings.limits
     spec = check_and_fill(body, sid, fitted, store, services.recordings, limits)
-    store.require_room(sid, BYTES_A_RUN * len(spec["runs"]))
+    store.files.require_room(sid, BYTES_A_RUN * len(spec["runs"]))
     return spec
 
 

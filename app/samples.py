@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from ..engine.run_notes import manoeuvre_beside
+from .measurement_store import NewMeasurement
 from .package_files import package_folder
 from .recordings import summary
-from .store import NewMeasurement
 
 FOLDER = "detailed"
 VEHICLE = "vehicle.json"

@@ -1,7 +1,7 @@
 """What the page will ask of the next identification, kept with its session part by part.
 
 Two pages may be open on one session, so what is kept is never replaced as a whole: each sends what
-it has changed, and the write lock orders them.
+it has changed, and the lock of the session orders them.
 """
 
 import json
@@ -11,7 +11,8 @@ from typing import Any
 from sqlalchemy import select, update
 
 from .database import Database
-from .errors import InvalidRequest, NotFound
+from .errors import InvalidRequest
+from .session_row import lock_session
 from .settings import Limits
 from .setup_form import SetupForm
 from .tables import measurements, sessions
@@ -41,15 +42,14 @@ class SetupStore:
                     field=part,
                 )
         with self._database.writing() as connection:
-            row = connection.execute(
+            lock_session(connection, session)
+            kept = connection.execute(
                 select(sessions.c.setup).where(sessions.c.id == session)
-            ).one_or_none()
-            if row is None:
-                raise NotFound("The session has been deleted; open the start page for a new one.")
+            ).scalar_one()
             runs = connection.execute(
                 select(measurements.c.id).where(measurements.c.session == session)
             ).scalars()
-            before = json.loads(row.setup) if row.setup else {}
+            before = json.loads(kept) if kept else {}
             setup = _merged({**SetupForm().model_dump(mode="json"), **before}, changes)
             here = set(runs)
             for part in OF_RUNS:

@@ -113,7 +113,7 @@ def _metric(metric: Metric, within: Bands | None) -> dict[str, Any]:
 
 def _vehicle(request: SimulationRequest, session: str, store: Store) -> Vehicle:
     data: Mapping[str, Any] = (
-        store.session(session).vehicle if request.vehicle is None else request.vehicle
+        store.sessions.get(session).vehicle if request.vehicle is None else request.vehicle
     )
     vehicle = vehicle_from_json(data)
     return vehicle.with_values(request.values) if request.values else vehicle

@@ -13,11 +13,12 @@ from .errors import InvalidRequest
 from .identification_job import check_budget, done, fitted_recordings
 from .job_kinds import Kind
 from .job_store import Job
+from .measurement_store import Measurement
 from .measurement_view import data_keys
 from .recordings import Recordings, as_stated, stated, with_braking
 from .schemas import ValidationRequest
 from .settings import Limits
-from .store import Measurement, Store
+from .store import Store
 from .worker import Attempt, WithFile
 
 KIND = "validation"
@@ -48,7 +49,7 @@ def check_and_fill(
     from ..engine.validation.geometry import geometry_from_json
 
     fit = done(fitted)
-    held = [store.measurement(session, one) for one in request.hold_out]
+    held = [store.measurements.get(session, one) for one in request.hold_out]
     runs = [{**one, "role": "fit"} for one in fitted.spec["runs"]]
     runs += [{**stated(one), "role": "hold-out"} for one in held]
     for field in ("manoeuvres", "braking"):
@@ -71,7 +72,7 @@ def check_and_fill(
         geometry_from_json(request.geometry)
     check_budget(kept, fit["settings"]["step"], limits)
     check_cases(_cases(spec, _runs(spec, session, store, recordings)))
-    of_session = store.measurements(session)
+    of_session = store.measurements.of_session(session)
     data = data_keys(of_session)
     seen = {data[one.id] for one in kept}
     left_out = [

@@ -101,9 +101,9 @@ def test_a_job_keeps_the_steps_that_it_was_given(visitor, kept, client):
     steps = visitor.get(address(kept)).json()["suggestion"]["steps"]
     visitor.put(address(kept), json={"steps": steps})
     services = client.app.state.services
-    told = json.loads(json.dumps(stated(services.store.measurement(visitor.id, kept["id"]))))
+    told = json.loads(json.dumps(stated(services.store.measurements.get(visitor.id, kept["id"]))))
     visitor.put(address(kept), json={"steps": []})
-    now = services.store.measurement(visitor.id, kept["id"])
+    now = services.store.measurements.get(visitor.id, kept["id"])
     assert services.recordings.run(now).conditioning == ()
     then = services.recordings.run(as_stated(services.store, visitor.id, told))
     assert [record.step for record in then.conditioning] == steps

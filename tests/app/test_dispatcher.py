@@ -43,9 +43,9 @@ KINDS = {
 class Team:
     """Dispatchers on one store, each with a cluster of its own."""
 
-    def __init__(self, path):
-        self.store = Store(path, Limits(unfinished_jobs=100))
-        self.ann, self.bob = (self.store.create_session({}, [])[0] for _ in range(2))
+    def __init__(self, path, database):
+        self.store = Store(path, Limits(unfinished_jobs=100), database)
+        self.ann, self.bob = (self.store.sessions.create({}, [])[0] for _ in range(2))
         self.sessions: dict[str, str] = {}
         self.dispatchers: list[Dispatcher] = []
 
@@ -71,10 +71,10 @@ class Team:
 
 
 @pytest.fixture
-def team(tmp_path, monkeypatch):
+def team(tmp_path, database, monkeypatch):
     monkeypatch.setattr(module, "LOOK_EVERY", 0.02)
     monkeypatch.setattr(module, "RETRY_AFTER", 0.02)
-    team = Team(tmp_path)
+    team = Team(tmp_path, database)
     yield team
     for one in team.dispatchers:
         one.close()

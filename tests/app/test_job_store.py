@@ -1,35 +1,35 @@
 """Who runs a job: claims, leases, hand-overs; and the parts that are kept while it runs."""
 
-import time
-
 import pytest
 from ridetune.app.errors import Busy, NotFound
 from ridetune.app.job_store import LEASE
+from ridetune.app.measurement_store import NewMeasurement
 from ridetune.app.settings import Limits
-from ridetune.app.store import NewMeasurement, Store
+from ridetune.app.store import Store
 
 CAR = {"name": "a car"}
 
 
 @pytest.fixture
-def store(tmp_path):
-    store = Store(tmp_path / "data", Limits(unfinished_jobs=10))
+def store(tmp_path, database):
+    store = Store(tmp_path / "data", Limits(unfinished_jobs=10), database)
     yield store
     store.close()
 
 
 @pytest.fixture
 def session(store) -> str:
-    return store.create_session(CAR, [])[0]
+    return store.sessions.create(CAR, [])[0]
 
 
 @pytest.fixture
-def later(monkeypatch):
-    """Set the clock on by some seconds, or back."""
-    true = time.time
+def later(store, monkeypatch):
+    """Set the database's clock on by some seconds, or back."""
+    kind = type(store.database)
+    true = kind.now.fget
 
     def set_on(seconds: float) -> None:
-        monkeypatch.setattr("ridetune.app.database.time.time", lambda: true() + seconds)
+        monkeypatch.setattr(kind, "now", property(lambda one: true(one) + seconds))
 
     return set_on
 
@@ -130,10 +130,10 @@ def test_what_is_handed_over_counts_as_no_crash(store, session):
     assert (kept.restarts, kept.attempts) == (0, 0)
 
 
-def test_after_a_crash_everything_is_claimable_at_once(tmp_path):
+def test_after_a_crash_everything_is_claimable_at_once_with_sqlite(tmp_path):
     """The lock of the data directory tells that its owner is gone, before the lease has run out."""
     store = Store(tmp_path, Limits())
-    session, _ = store.create_session(CAR, [])
+    session, _ = store.sessions.create(CAR, [])
     running, waiting = queued(store, session), queued(store, session)
     claimed(store, "a")
     store.jobs.start(running, "a")
@@ -150,7 +150,7 @@ def test_a_job_without_an_owner_is_cancelled_at_once(store, session):
     assert store.jobs.ask_to_cancel(session, job).state == "cancelled"
     assert claimed(store, "a") == []
     assert store.jobs.ask_to_cancel(session, job).state == "cancelled"
-    other, _ = store.create_session(CAR, [])
+    other, _ = store.sessions.create(CAR, [])
     with pytest.raises(NotFound):
         store.jobs.ask_to_cancel(other, job)
 
@@ -181,16 +181,16 @@ def originals(store: Store) -> set[bytes]:
     return {file.read_bytes() for file in store.directory.originals.glob("*/*")}
 
 
-def test_parts_are_kept_until_the_job_ends(tmp_path):
+def test_parts_are_kept_until_the_job_ends(tmp_path, database):
     """The first one under a name stays; what comes after the end is not kept."""
-    store = Store(tmp_path, Limits())
-    session, _ = store.create_session(CAR, [])
+    store = Store(tmp_path, Limits(), database)
+    session, _ = store.sessions.create(CAR, [])
     job = queued(store, session)
     assert store.parts(job) == {}
     assert all(store.keep_part(job, name, name.encode()) for name in "ba")
     assert store.keep_part(job, "a", b"again")
     store.close()
-    store = Store(tmp_path, Limits())
+    store = Store(tmp_path, Limits(), database)
     assert list(store.parts(job)) == ["a", "b"]
     assert store.part(job, "a") == b"a"
     assert originals(store) == {b"a", b"b"}
@@ -216,18 +216,18 @@ def test_parts_go_with_their_job_however_it_goes(store, session, end):
         assert store.parts(job) == {}
         store.finish_job(queued(store, session), "failed")
     else:
-        store.delete_session(session)
+        store.sessions.delete(session)
     assert originals(store) == set()
 
 
-def test_parts_count_in_the_session_s_bytes(tmp_path):
-    store = Store(tmp_path, Limits(session_bytes=10))
-    session, _ = store.create_session(CAR, [])
+def test_parts_count_in_the_session_s_bytes(tmp_path, database):
+    store = Store(tmp_path, Limits(session_bytes=10), database)
+    session, _ = store.sessions.create(CAR, [])
     job = queued(store, session)
     for name in "ab":
         assert store.keep_part(job, name, b"1234")
     with pytest.raises(Busy, match="delete one first"):
-        store.add_measurement(session, NewMeasurement("run.csv", b"123", {}, {}))
+        store.measurements.add(session, NewMeasurement("run.csv", b"123", {}, {}))
     store.finish_job(job, "done")
-    store.add_measurement(session, NewMeasurement("run.csv", b"123", {}, {}))
+    store.measurements.add(session, NewMeasurement("run.csv", b"123", {}, {}))
     store.close()

@@ -232,7 +232,7 @@ def test_a_job_reads_a_recording_as_it_was_mapped_then(visitor, kept):
     """Its mapping, and what was done to it, are the job's for ever."""
     path, shared = f"/measurements/{kept['id']}", visitor.client.app.state.services
     visitor.put(f"{path}/mapping", json=visitor.get(f"{path}/columns").json()["proposed"])
-    mapped = shared.store.measurement(visitor.id, kept["id"])
+    mapped = shared.store.measurements.get(visitor.id, kept["id"])
     run = shared.recordings.run(mapped)
     assert visitor.delete(f"{path}/mapping").json()["needs_mapping"] is True
     again = shared.recordings.run(as_stated(shared.store, visitor.id, stated(mapped)))

@@ -93,7 +93,7 @@ def test_what_was_deleted_meanwhile_is_shown_as_it_was(visitor):
     """Between reading it and looking at its session another request may delete it."""
     kept = visitor.upload(short_recording()).json()
     store = visitor.client.app.state.services.store
-    before = store.measurement(visitor.id, kept["id"])
+    before = store.measurements.get(visitor.id, kept["id"])
     visitor.delete(f"/measurements/{kept['id']}")
     shown = measurement_to_json(store, visitor.id, before)
     assert (shown["id"], shown["same_data_as"]) == (kept["id"], None)

@@ -74,7 +74,7 @@ def test_one_child_reads_for_all_who_want_the_same(client, gate):
     kept = visitor.upload(short_recording()).json()
     shared, gate.started = client.app.state.services, 0
     recordings = Recordings(shared.store)
-    measurement = shared.store.measurement(visitor.id, kept["id"])
+    measurement = shared.store.measurements.get(visitor.id, kept["id"])
     with ThreadPoolExecutor(8) as pool:
         runs = list(pool.map(lambda _: recordings.run(measurement), range(8)))
     assert {run.duration for run in runs} == {kept["duration"]}
@@ -143,7 +143,7 @@ def test_a_file_is_read_again_under_a_name_of_another_kind(client, gate):
     gate.open.set()
     kept = visitor.upload(short_recording(), "run.csv").json()
     shared = client.app.state.services
-    measurement = shared.store.measurement(visitor.id, kept["id"])
+    measurement = shared.store.measurements.get(visitor.id, kept["id"])
     assert shared.recordings.run(measurement).name == "run.csv"
     with pytest.raises(MeasurementError, match=r"run\.mat: the file is no MAT file"):
         shared.recordings.run(replace(measurement, name="run.mat"))
@@ -154,7 +154,7 @@ def test_a_recording_that_is_deleted_while_it_waits_to_be_read_is_not_found(clie
     gate.open.set()
     kept = visitor.upload(short_recording(samples=57)).json()
     shared = client.app.state.services
-    measurement = shared.store.measurement(visitor.id, kept["id"])
+    measurement = shared.store.measurements.get(visitor.id, kept["id"])
     assert visitor.delete(f"/measurements/{kept['id']}").status_code == 204
     with pytest.raises(NotFound, match=r"run\.csv has been deleted meanwhile"):
         Recordings(shared.store).run(measurement)

@@ -12,23 +12,24 @@ from pathlib import Path
 import pytest
 from ridetune.app.data_directory import DataDirectory
 from ridetune.app.errors import Busy, Conflict, NotFound, StartError
+from ridetune.app.measurement_store import NewMeasurement
 from ridetune.app.settings import Limits
 from ridetune.app.setup_form import SetupForm
-from ridetune.app.store import NewMeasurement, Store
+from ridetune.app.store import Store
 
 CAR = {"name": "a car"}
 
 
 @pytest.fixture
-def store(tmp_path):
-    store = Store(tmp_path / "data", Limits(unfinished_jobs=2, session_jobs=3))
+def store(tmp_path, database):
+    store = Store(tmp_path / "data", Limits(unfinished_jobs=2, session_jobs=3), database)
     yield store
     store.close()
 
 
 @pytest.fixture
 def session(store) -> str:
-    return store.create_session(CAR, [])[0]
+    return store.sessions.create(CAR, [])[0]
 
 
 def recording(data: bytes = b"0 1 2") -> NewMeasurement:
@@ -73,8 +74,9 @@ def test_a_directory_that_cannot_be_made_is_named(tmp_path):
         DataDirectory(tmp_path / "file" / "below")
 
 
-def test_the_database_flushes_every_commit_and_checks_references(store):
+def test_sqlite_flushes_every_commit_and_checks_references(tmp_path):
     """WAL, synchronous=FULL (2), foreign keys on: read back from the connection itself."""
+    store = Store(tmp_path, Limits())
     with store.database.reading() as connection:
         answers = {
             name: connection.exec_driver_sql(f"PRAGMA {name}").scalar()
@@ -86,6 +88,7 @@ def test_the_database_flushes_every_commit_and_checks_references(store):
         "foreign_keys": 1,
         "busy_timeout": 10_000,
     }
+    store.close()
 
 
 def test_a_database_of_another_version_is_refused(tmp_path):
@@ -102,9 +105,9 @@ def test_a_database_of_another_version_is_refused(tmp_path):
 def test_a_database_of_an_earlier_version_is_taken_over(tmp_path, version):
     """Oracle: what it kept; afterwards it keeps all that is new since like any other."""
     store = Store(tmp_path, Limits())
-    session, _ = store.create_session(CAR, [recording()])
+    session, _ = store.sessions.create(CAR, [recording()])
     done, job = queued(store, session), queued(store, session)
-    store.jobs.finish(done, "done", result={"cost": 1.5})
+    store.finish_job(done, "done", result={"cost": 1.5})
     store.close()
     with sqlite3.connect(tmp_path / "ridetune.sqlite") as connection:
         for column in ("owner", "heartbeat_at", "cancel_asked", "priority"):
@@ -126,62 +129,67 @@ def test_a_database_of_an_earlier_version_is_taken_over(tmp_path, version):
     connection.close()
     store = Store(tmp_path, Limits())
     assert store.jobs.get(session, done).result == {"cost": 1.5}
-    [kept] = store.measurements(session)
+    [kept] = store.measurements.of_session(session)
     assert (kept.manoeuvre, kept.mapping, kept.conditioning) == (None, None, None)
-    assert store.set_mapping(session, kept.id, {"columns": []}, {}, {}).mapping == {"columns": []}
+    measured = store.measurements
+    assert measured.set_mapping(session, kept.id, {"columns": []}, {}, {}).mapping is not None
     store.mappings.keep(session, "car 7", {"columns": []})
-    done = store.set_conditioning(session, kept.id, {"steps": [], "vehicle": None}, kept.summary)
-    assert done.conditioning == {"steps": [], "vehicle": None}
-    noted = store.set_notes(session, kept.id, {}, [{"step": {"kind": "rest"}}], kept.summary)
-    assert noted.conditioned == [{"step": {"kind": "rest"}}]
-    assert store.session(session).setup is None
+    steps = {"steps": [], "vehicle": None}
+    assert measured.set_conditioning(session, kept.id, steps, kept.summary).conditioning == steps
+    done = [{"step": {"kind": "rest"}}]
+    assert measured.set_notes(session, kept.id, {}, done, kept.summary).conditioned == done
+    assert store.sessions.get(session).setup is None
     store.setups.change(session, SetupForm(starts=16))
-    assert (store.session(session).setup or {})["starts"] == 16
-    assert store.set_manoeuvre(session, kept.id, {"name": "lap"}).manoeuvre == {"name": "lap"}
+    assert (store.sessions.get(session).setup or {})["starts"] == 16
+    assert measured.set_manoeuvre(session, kept.id, {"name": "lap"}).manoeuvre == {"name": "lap"}
     assert [one.id for one in store.jobs.claim("me", 5)] == [job]
     assert store.keep_part(job, "first", b"half the rows")
     assert store.finish_job(job, "done", result={}, file=b"rows")
     store.close()
 
 
-def test_everything_is_there_after_reopening(tmp_path):
-    store = Store(tmp_path, Limits())
-    session, token = store.create_session(CAR, [recording(b"sample")])
-    kept = store.add_measurement(session, recording())
+def test_everything_is_there_after_reopening(tmp_path, database):
+    store = Store(tmp_path, Limits(), database)
+    session, token = store.sessions.create(CAR, [recording(b"sample")])
+    kept = store.measurements.add(session, recording())
     job = queued(store, session)
-    store.jobs.finish(job, "done", result={"cost": 1.5})
+    store.finish_job(job, "done", result={"cost": 1.5})
     store.close()
 
-    store = Store(tmp_path, Limits())
-    assert store.holds(session, token)
-    assert store.session(session).vehicle == CAR
-    assert [one.name for one in store.measurements(session)] == ["run.csv", "run.csv"]
-    assert store.original(store.measurement(session, kept.id)).read_bytes() == b"0 1 2"
-    assert store.measurement(session, kept.id).noise == {"chassis.z": 1e-3}
+    store = Store(tmp_path, Limits(), database)
+    assert store.sessions.holds(session, token)
+    assert store.sessions.get(session).vehicle == CAR
+    assert [one.name for one in store.measurements.of_session(session)] == ["run.csv", "run.csv"]
+    assert (
+        store.measurements.original(store.measurements.get(session, kept.id)).read_bytes()
+        == b"0 1 2"
+    )
+    assert store.measurements.get(session, kept.id).noise == {"chassis.z": 1e-3}
     assert store.jobs.get(session, job).result == {"cost": 1.5}
     store.close()
 
 
-def test_leftovers_of_a_crash_are_swept_and_originals_stay(tmp_path):
+def test_leftovers_of_a_crash_are_swept_and_originals_stay(tmp_path, database):
     """A half-written file and one whose row was never committed."""
-    store = Store(tmp_path, Limits())
-    session, _ = store.create_session(CAR, [])
-    kept = store.original(store.add_measurement(session, recording()))
+    store = Store(tmp_path, Limits(), database)
+    session, _ = store.sessions.create(CAR, [])
+    kept = store.measurements.original(store.measurements.add(session, recording()))
     store.close()
-    orphan = kept.with_name("0" * 64)
+    orphan = store.directory.original("0" * 64)
+    orphan.parent.mkdir()
     half = kept.with_suffix(".tmp")
     for leftover in (orphan, half):
         leftover.write_bytes(b"?")
-    Store(tmp_path, Limits()).close()
+    Store(tmp_path, Limits(), database).close()
     assert kept.read_bytes() == b"0 1 2"
     assert not orphan.exists()
     assert not half.exists()
 
 
 def test_an_original_is_named_by_its_hash(store, session):
-    kept = store.add_measurement(session, recording(b"abc"))
+    kept = store.measurements.add(session, recording(b"abc"))
     assert kept.sha256 == hashlib.sha256(b"abc").hexdigest()
-    assert store.original(kept).name == kept.sha256
+    assert store.measurements.original(kept).name == kept.sha256
 
 
 def test_uploads_and_deletions_of_the_same_bytes_at_once_never_lose_a_file(store, session):
@@ -191,9 +199,9 @@ def test_uploads_and_deletions_of_the_same_bytes_at_once_never_lose_a_file(store
     def come_and_go() -> None:
         try:
             for _ in range(15):
-                kept = store.add_measurement(session, recording())
-                assert store.original(kept).read_bytes() == b"0 1 2"
-                store.delete_measurement(session, kept.id)
+                kept = store.measurements.add(session, recording())
+                assert store.measurements.original(kept).read_bytes() == b"0 1 2"
+                store.measurements.delete(session, kept.id)
         except Exception as error:
             errors.append(error)
 
@@ -203,40 +211,40 @@ def test_uploads_and_deletions_of_the_same_bytes_at_once_never_lose_a_file(store
     for thread in threads:
         thread.join()
     assert errors == []
-    assert store.measurements(session) == []
+    assert store.measurements.of_session(session) == []
 
 
 def test_a_token_opens_its_own_session_only(store):
-    (first, first_token), (second, second_token) = (store.create_session(CAR, []) for _ in "ab")
-    assert store.holds(first, first_token)
-    assert not store.holds(first, second_token)
-    assert not store.holds(second, "")
-    assert not store.holds("nobody", first_token)
+    (first, first_token), (second, second_token) = (store.sessions.create(CAR, []) for _ in "ab")
+    assert store.sessions.holds(first, first_token)
+    assert not store.sessions.holds(first, second_token)
+    assert not store.sessions.holds(second, "")
+    assert not store.sessions.holds("nobody", first_token)
 
 
-def test_room_is_made_from_sessions_nobody_used(tmp_path, monkeypatch):
+def test_room_is_made_from_sessions_nobody_used(tmp_path, database, monkeypatch):
     """A session with something of its own stays; one that only looked goes after an hour."""
-    store = Store(tmp_path, Limits(sessions=2))
-    used, used_token = store.create_session(CAR, [])
-    store.set_vehicle(used, {"name": "mine"})
-    looked, looked_token = store.create_session(CAR, [])
+    store = Store(tmp_path, Limits(sessions=2), database)
+    used, used_token = store.sessions.create(CAR, [])
+    store.sessions.set_vehicle(used, {"name": "mine"})
+    looked, looked_token = store.sessions.create(CAR, [])
     now = time.time()
-    monkeypatch.setattr("ridetune.app.store.time.time", lambda: now + 7200.0)
-    store.create_session(CAR, [])
-    assert store.holds(used, used_token)
-    assert not store.holds(looked, looked_token)
+    monkeypatch.setattr("ridetune.app.session_store.time.time", lambda: now + 7200.0)
+    store.sessions.create(CAR, [])
+    assert store.sessions.holds(used, used_token)
+    assert not store.sessions.holds(looked, looked_token)
     store.close()
 
 
 def test_a_measurement_in_use_is_not_deleted(store, session):
-    kept = store.add_measurement(session, recording())
+    kept = store.measurements.add(session, recording())
     job = queued(store, session, runs=(kept.id,))
     with pytest.raises(Conflict, match=job):
-        store.delete_measurement(session, kept.id)
-    store.jobs.finish(job, "cancelled")
-    store.delete_measurement(session, kept.id)
+        store.measurements.delete(session, kept.id)
+    store.finish_job(job, "cancelled")
+    store.measurements.delete(session, kept.id)
     with pytest.raises(NotFound):
-        store.measurement(session, kept.id)
+        store.measurements.get(session, kept.id)
 
 
 def test_the_same_key_is_the_same_job(store, session):
@@ -247,7 +255,7 @@ def test_the_same_key_is_the_same_job(store, session):
     assert store.jobs.known(session, "mine", "a fit") == first
     assert store.jobs.known(session, "yours", "a fit") is None
     assert store.jobs.known(session, None, "a fit") is None
-    other, _ = store.create_session(CAR, [])
+    other, _ = store.sessions.create(CAR, [])
     assert queued(store, other, key="mine") != first.id
 
 
@@ -256,8 +264,8 @@ def test_a_session_has_its_share_of_jobs(store, session):
     first, _ = queued(store, session), queued(store, session)
     with pytest.raises(Busy, match="2 jobs under way"):
         queued(store, session)
-    store.jobs.finish(first, "done")
-    store.jobs.finish(queued(store, session), "failed", error={"code": "x", "detail": "y"})
+    store.finish_job(first, "done")
+    store.finish_job(queued(store, session), "failed", error={"code": "x", "detail": "y"})
     with pytest.raises(Busy, match="delete some"):
         queued(store, session)
     assert [job.state for job in store.jobs.of_session(session, "test")] == [
@@ -270,8 +278,8 @@ def test_a_session_has_its_share_of_jobs(store, session):
 def test_a_final_state_stays(store, session):
     """Whatever news comes late: the first end is the end."""
     job = queued(store, session)
-    assert store.jobs.finish(job, "cancelled")
-    assert not store.jobs.finish(job, "done", result={"late": True})
+    assert store.finish_job(job, "cancelled")
+    assert not store.finish_job(job, "done", result={"late": True})
     assert not store.jobs.start(job, "me")
     assert not store.jobs.requeue(job, "me")
     kept = store.jobs.get(session, job)
@@ -289,66 +297,66 @@ def made(store: Store, session: str, data: bytes) -> tuple[str, Path]:
 
 def test_a_job_s_file_goes_with_its_last_owner(store, session):
     """Two jobs and a measurement that happen to hold the same bytes; then the session."""
-    measured = store.add_measurement(session, recording(b"rows"))
+    measured = store.measurements.add(session, recording(b"rows"))
     (first, file), (second, same) = made(store, session, b"rows"), made(store, session, b"rows")
     assert file == same
-    store.delete_measurement(session, measured.id)
+    store.measurements.delete(session, measured.id)
     store.delete_job(session, first)
     assert file.read_bytes() == b"rows"
     store.delete_job(session, second)
     assert not file.exists()
     _, file = made(store, session, b"others")
-    store.delete_session(session)
+    store.sessions.delete(session)
     assert not file.exists()
 
 
-def test_a_job_s_file_outlives_a_restart_and_one_that_came_too_late_is_not_kept(tmp_path):
-    store = Store(tmp_path, Limits())
-    session, _ = store.create_session(CAR, [])
+def test_a_job_s_file_outlives_a_restart_and_one_that_came_too_late_is_not_kept(tmp_path, database):
+    store = Store(tmp_path, Limits(), database)
+    session, _ = store.sessions.create(CAR, [])
     _, kept = made(store, session, b"rows")
     cancelled = queued(store, session)
-    store.jobs.finish(cancelled, "cancelled")
+    store.finish_job(cancelled, "cancelled")
     assert not store.finish_job(cancelled, "done", result={}, file=b"late")
     store.close()
-    store = Store(tmp_path, Limits())
+    store = Store(tmp_path, Limits(), database)
     assert kept.read_bytes() == b"rows"
     assert [file.name for file in store.directory.originals.glob("*/*")] == [kept.name]
     store.close()
 
 
-def test_files_of_jobs_take_their_share_of_the_session(tmp_path):
-    store = Store(tmp_path, Limits(session_bytes=10))
-    session, _ = store.create_session(CAR, [])
+def test_files_of_jobs_take_their_share_of_the_session(tmp_path, database):
+    store = Store(tmp_path, Limits(session_bytes=10), database)
+    session, _ = store.sessions.create(CAR, [])
     job, _ = made(store, session, b"1234567")
-    store.require_room(session, 3)
+    store.files.require_room(session, 3)
     with pytest.raises(Busy, match="measurements and sweeps would exceed 1e-05 MB together"):
-        store.require_room(session, 4)
+        store.files.require_room(session, 4)
     with pytest.raises(Busy, match="delete one first"):
-        store.add_measurement(session, recording(b"1234"))
+        store.measurements.add(session, recording(b"1234"))
     store.delete_job(session, job)
-    store.add_measurement(session, recording(b"1234"))
+    store.measurements.add(session, recording(b"1234"))
     store.close()
 
 
-def test_manoeuvres_take_their_share_of_the_session(tmp_path):
+def test_manoeuvres_take_their_share_of_the_session(tmp_path, database):
     """Oracle: {"name": "..."} has 12 characters besides the name."""
-    store = Store(tmp_path, Limits(session_bytes=100))
-    session, _ = store.create_session(CAR, [])
-    one, other = (store.add_measurement(session, recording(b"12345")) for _ in range(2))
-    store.set_manoeuvre(session, one.id, {"name": "x" * 68})
-    store.require_room(session, 10)
+    store = Store(tmp_path, Limits(session_bytes=100), database)
+    session, _ = store.sessions.create(CAR, [])
+    one, other = (store.measurements.add(session, recording(b"12345")) for _ in range(2))
+    store.measurements.set_manoeuvre(session, one.id, {"name": "x" * 68})
+    store.files.require_room(session, 10)
     with pytest.raises(Busy, match="delete one first"):
-        store.set_manoeuvre(session, other.id, {"name": ""})
-    assert store.measurement(session, other.id).manoeuvre is None
-    store.set_manoeuvre(session, one.id, None)
-    store.set_manoeuvre(session, other.id, {"name": ""})
+        store.measurements.set_manoeuvre(session, other.id, {"name": ""})
+    assert store.measurements.get(session, other.id).manoeuvre is None
+    store.measurements.set_manoeuvre(session, one.id, None)
+    store.measurements.set_manoeuvre(session, other.id, {"name": ""})
     store.close()
 
 
-def test_mappings_are_kept_by_name_and_take_their_share_of_the_session(tmp_path):
+def test_mappings_are_kept_by_name_and_take_their_share_of_the_session(tmp_path, database):
     """Oracle: {"a": "..."} has 9 characters besides what is between the quotes."""
-    store = Store(tmp_path, Limits(session_bytes=100))
-    (session, _), (other, _) = (store.create_session(CAR, []) for _ in "ab")
+    store = Store(tmp_path, Limits(session_bytes=100), database)
+    (session, _), (other, _) = (store.sessions.create(CAR, []) for _ in "ab")
     store.mappings.keep(session, "first", {"a": "x" * 31})
     store.mappings.keep(session, "second", {"a": ""})
     assert list(store.mappings.of_session(session)) == ["second", "first"]
@@ -361,7 +369,7 @@ def test_mappings_are_kept_by_name_and_take_their_share_of_the_session(tmp_path)
         store.mappings.delete(other, "first")
     store.mappings.delete(session, "first")
     assert store.mappings.of_session(session) == {"second": {"a": ""}}
-    store.delete_session(session)
+    store.sessions.delete(session)
     assert store.mappings.of_session(session) == {}
     store.close()
 
@@ -375,17 +383,17 @@ def test_a_session_keeps_a_hundred_mappings(store, session):
 
 
 def test_a_measurement_in_use_keeps_its_mapping(store, session):
-    kept = store.add_measurement(session, recording())
+    kept = store.measurements.add(session, recording())
     job = queued(store, session, runs=(kept.id,))
     with pytest.raises(Conflict, match=job):
-        store.set_mapping(session, kept.id, {}, {}, {})
-    store.jobs.finish(job, "cancelled")
-    assert store.set_mapping(session, kept.id, {}, {}, {}).mapping == {}
+        store.measurements.set_mapping(session, kept.id, {}, {}, {})
+    store.finish_job(job, "cancelled")
+    assert store.measurements.set_mapping(session, kept.id, {}, {}, {}).mapping == {}
 
 
 def test_jobs_of_another_session_are_not_found(store, session):
     job = queued(store, session)
-    other, _ = store.create_session(CAR, [])
+    other, _ = store.sessions.create(CAR, [])
     with pytest.raises(NotFound):
         store.jobs.get(other, job)
     store.jobs.delete(other, job)
@@ -399,3 +407,13 @@ def test_what_was_being_read_when_the_service_was_killed_is_removed(tmp_path):
     (tmp_path / "reading/upload").write_bytes(b"2")
     Store(tmp_path, Limits()).close()
     assert list((tmp_path / "reading").iterdir()) == []
+
+
+def test_what_another_service_reads_stays_in_a_shared_directory(tmp_path, on_postgresql):
+    """Only what is so old that nobody can be reading it any more goes."""
+    fresh, old = tmp_path / "reading/fresh", tmp_path / "reading/old"
+    fresh.mkdir(parents=True)
+    old.mkdir()
+    os.utime(old, (0, 0))
+    Store(tmp_path, Limits(), on_postgresql).close()
+    assert list((tmp_path / "reading").iterdir()) == [fresh]

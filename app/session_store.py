@@ -1,0 +1,142 @@
+"""Sessions: who they belong to, and the cars that are tuned in them."""
+
+import hashlib
+import hmac
+import json
+import secrets
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Connection, delete, func, insert, select, update
+
+from .database import Database
+from .errors import NotFound, Unavailable
+from .file_store import FileStore
+from .measurement_store import MeasurementStore, NewMeasurement
+from .session_row import GONE
+from .settings import Limits
+from .tables import jobs, sessions
+
+SEEN_EVERY = 60.0
+UNUSED_AFTER = 3600.0
+
+
+@dataclass(frozen=True)
+class Session:
+    """One visitor's workspace: the car being tuned and the car it is compared with, as JSON.
+
+    setup : what the next identification is told, None while nothing was chosen
+    """
+
+    id: str
+    vehicle: dict[str, Any]
+    baseline: dict[str, Any]
+    setup: dict[str, Any] | None
+
+
+class SessionStore:
+    """All sessions."""
+
+    def __init__(
+        self, database: Database, limits: Limits, files: FileStore, measurements: MeasurementStore
+    ):
+        self._database = database
+        self._limits = limits
+        self._files = files
+        self._measurements = measurements
+        self._seen: dict[str, float] = {}
+
+    def create(
+        self, vehicle: Mapping[str, Any], samples: Sequence[NewMeasurement]
+    ) -> tuple[str, str]:
+        """Id and token of a fresh session that holds a vehicle and sample measurements."""
+        session, token, now = secrets.token_hex(8), secrets.token_urlsafe(32), time.time()
+        text = json.dumps(vehicle)
+        with self._database.writing() as connection:
+            self._make_room(connection, now)
+            connection.execute(
+                insert(sessions).values(
+                    id=session,
+                    token_hash=_hash(token),
+                    created=now,
+                    seen=now,
+                    vehicle=text,
+                    baseline=text,
+                )
+            )
+            self._measurements.insert(connection, session, samples)
+        return session, token
+
+    def _make_room(self, connection: Connection, now: float) -> None:
+        """Let go of workspaces that nobody ever used, if there are too many."""
+        self._database.lock(connection, {"sessions"})
+        count = select(func.count()).select_from(sessions)
+        if connection.execute(count).scalar_one() < self._limits.sessions:
+            return
+        unused = sessions.c.used.is_(False) & (sessions.c.seen < now - UNUSED_AFTER)
+        connection.execute(delete(sessions).where(unused))
+        if connection.execute(count).scalar_one() >= self._limits.sessions:
+            raise Unavailable(
+                f"The service already keeps {self._limits.sessions} sessions; delete one that is "
+                "no longer needed, or try again later.",
+                retry_after=600,
+            )
+
+    def holds(self, session: str, token: str) -> bool:
+        """Whether the token opens the session; notes that the session is in use."""
+        with self._database.reading() as connection:
+            kept = connection.execute(
+                select(sessions.c.token_hash).where(sessions.c.id == session)
+            ).scalar_one_or_none()
+        if kept is None or not hmac.compare_digest(kept, _hash(token)):
+            return False
+        now = time.time()
+        if now - self._seen.get(session, 0.0) > SEEN_EVERY:
+            self._seen[session] = now
+            self._set(session, seen=now)
+        return True
+
+    def get(self, session: str) -> Session:
+        """The workspace."""
+        with self._database.reading() as connection:
+            row = connection.execute(
+                select(sessions.c.vehicle, sessions.c.baseline, sessions.c.setup).where(
+                    sessions.c.id == session
+                )
+            ).one_or_none()
+        if row is None:
+            raise NotFound(GONE)
+        return Session(
+            session,
+            json.loads(row.vehicle),
+            json.loads(row.baseline),
+            row.setup and json.loads(row.setup),
+        )
+
+    def set_vehicle(self, session: str, vehicle: Mapping[str, Any]) -> None:
+        """Replace the car being tuned."""
+        self._set(session, vehicle=json.dumps(vehicle), used=True)
+
+    def set_baseline(self, session: str, vehicle: Mapping[str, Any]) -> None:
+        """Replace the car it is compared with."""
+        self._set(session, baseline=json.dumps(vehicle), used=True)
+
+    def _set(self, session: str, **values: Any) -> None:
+        with self._database.writing() as connection:
+            connection.execute(update(sessions).where(sessions.c.id == session).values(**values))
+
+    def delete(self, session: str) -> None:
+        """Remove a workspace with all its measurements, jobs and results."""
+        with self._database.writing() as connection:
+            # In the order in which whoever locks several jobs does.
+            mine = select(jobs.c.id).where(jobs.c.session == session).order_by(jobs.c.id)
+            connection.execute(mine.with_for_update())
+            connection.execute(delete(sessions).where(sessions.c.id == session))
+        self._files.drop_unreferenced()
+        self._seen.pop(session, None)
+
+
+def _hash(token: str) -> str:
+    return hashlib.sha256(token.encode()).hexdigest()
