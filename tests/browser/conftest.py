@@ -49,9 +49,9 @@ NOISE = re.compile(r"THREE\.Clock|GPU stall|WebGL.*software|swiftshader", re.IGN
 
 
 class Service:
-    """`ridetune serve` as a process of its own."""
+    """`ridetune serve` as a process of its own, with settings from the environment."""
 
-    def __init__(self, data: Path, port: int = 0):
+    def __init__(self, data: Path, port: int = 0, **environment: str):
         self.data = data
         code = "from ridetune.app.cli import main; raise SystemExit(main())"
         command = [sys.executable, "-c", code, "serve", "--data", str(data), "--port", str(port)]
@@ -60,7 +60,7 @@ class Service:
             command,
             stdout=subprocess.PIPE,
             stderr=self.log,
-            env=os.environ | {"PYTHONUNBUFFERED": "1"},
+            env=os.environ | {"PYTHONUNBUFFERED": "1"} | environment,
             start_new_session=True,
         )
         assert self.process.stdout is not None
