@@ -1,7 +1,8 @@
-"""The folder that holds everything the service keeps, owned by one process at a time.
+"""The folder that holds what the service keeps: of one process, or of those that share a database.
 
     owner.lock          locked while a service runs; says which process that is
-    ridetune.sqlite     the database
+    ridetune.sqlite     the database, and in its place
+    postgresql.id       which PostgreSQL database has the rows of these files
     originals/ab/...    uploads, byte for byte, and what jobs made, each under its SHA-256
     reading/            uploads that a child reads, and the folders that children work in
     dask/               scratch space of the job workers
@@ -11,10 +12,13 @@ power cut it is there whole or not at all. The kernel drops the lock with the pr
 ended.
 """
 
+import contextlib
 import fcntl
+import math
 import os
 import secrets
 import shutil
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -22,34 +26,71 @@ from .errors import StartError
 
 
 class DataDirectory:
-    """The folder, once locked; `close` gives it up."""
+    """The folder, once it is clear whose it is; `close` gives it up.
 
-    def __init__(self, path: Path):
+    database : id of the PostgreSQL database whose services share the folder; None where one
+        service owns it, which locks it
+    """
+
+    def __init__(self, path: Path, database: str | None = None):
         self.path = path
+        self._lock: int | None = None
         try:
             path.mkdir(parents=True, exist_ok=True)
             self.originals = path / "originals"
             self.originals.mkdir(exist_ok=True)
+            self.reading.mkdir(exist_ok=True)
+            if database is not None:
+                self._join(database)
+                return
             self._lock = os.open(path / "owner.lock", os.O_RDWR | os.O_CREAT, 0o600)
         except OSError as error:
             raise StartError(
                 f"The data directory {path} cannot be used ({error.strerror}); "
                 "choose another with --data."
             ) from None
-        self._own()
+        self._own(self._lock)
 
-    def _own(self) -> None:
+    def _join(self, database: str) -> None:
+        """Refuse a folder of another database, in which everything would look left over."""
+        if self.database.exists():
+            raise StartError(
+                f"The data directory {self.path} holds an SQLite database; take it over with "
+                "ridetune backup and restore, and choose another directory with --data."
+            )
+        if not self._mark.exists():
+            beside = self._mark.with_suffix(f".{secrets.token_hex(4)}.tmp")
+            _write(beside, f"{database}\n".encode())
+            os.replace(beside, self._mark)
+            _flush_folder(self.path)
+        if self._mark.read_text().strip() != database:
+            raise StartError(
+                f"The data directory {self.path} belongs to another PostgreSQL database; choose "
+                "another one with --data, or name its own in RIDETUNE_DATABASE."
+            )
+
+    def _own(self, lock: int) -> None:
         try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
-            owner = os.read(self._lock, 20).decode(errors="replace").strip() or "unknown"
-            os.close(self._lock)
+            owner = os.read(lock, 20).decode(errors="replace").strip() or "unknown"
+            os.close(lock)
             raise StartError(
                 f"The data directory {self.path} is in use by another ridetune (process {owner}); "
                 "stop that one or choose another directory with --data."
             ) from None
-        os.ftruncate(self._lock, 0)
-        os.pwrite(self._lock, f"{os.getpid()}\n".encode(), 0)
+        if self._mark.exists():
+            os.close(lock)
+            raise StartError(
+                f"The data directory {self.path} belongs to a PostgreSQL database; name it in "
+                "RIDETUNE_DATABASE, or choose another directory with --data."
+            )
+        os.ftruncate(lock, 0)
+        os.pwrite(lock, f"{os.getpid()}\n".encode(), 0)
+
+    @property
+    def _mark(self) -> Path:
+        return self.path / "postgresql.id"
 
     @property
     def database(self) -> Path:
@@ -78,10 +119,7 @@ class DataDirectory:
         place.parent.mkdir(exist_ok=True)
         beside = place.with_suffix(f".{secrets.token_hex(4)}.tmp")
         try:
-            with open(beside, "wb") as file:
-                file.write(data)
-                file.flush()
-                os.fsync(file.fileno())
+            _write(beside, data)
             os.replace(beside, place)
         except OSError:
             beside.unlink(missing_ok=True)
@@ -97,14 +135,28 @@ class DataDirectory:
         """Remove one of them."""
         self.original(name).unlink(missing_ok=True)
 
-    def sweep(self) -> None:
-        """Remove what was being read in a crash."""
-        shutil.rmtree(self.reading, ignore_errors=True)
-        self.reading.mkdir(exist_ok=True)
+    def sweep(self, older: float = -math.inf) -> None:
+        """Remove what was being read when a service crashed: what is so old, s."""
+        for left in self.reading.iterdir():
+            with contextlib.suppress(OSError):
+                if time.time() - left.lstat().st_mtime < older:
+                    continue
+                if left.is_dir() and not left.is_symlink():
+                    shutil.rmtree(left, ignore_errors=True)
+                else:
+                    left.unlink()
 
     def close(self) -> None:
         """Give up the folder."""
-        os.close(self._lock)
+        if self._lock is not None:
+            os.close(self._lock)
+
+
+def _write(place: Path, data: bytes) -> None:
+    with open(place, "wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
 
 
 def _flush_folder(folder: Path) -> None:

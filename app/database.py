@@ -1,93 +1,113 @@
-"""SQLite through SQLAlchemy Core: durable commits, one writer at a time, a checked schema.
+"""The database through SQLAlchemy Core: durable commits, a checked schema, troubles in a sentence.
 
-WAL with synchronous=FULL: what was answered survives a power cut. A writing transaction takes the
-write lock at its start (BEGIN IMMEDIATE), so it waits for its turn instead of failing half way.
+Which database it is, and what is particular of it, is in `sqlite` and `postgresql`.
 """
 
-import time
-from collections.abc import Collection
-from contextlib import AbstractContextManager
+import logging
+import secrets
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from itertools import chain
-from pathlib import Path
-from typing import Any
 
 from sqlalchemy import (
     ColumnElement,
     Connection,
-    Float,
-    create_engine,
-    event,
+    Engine,
     insert,
     inspect,
-    literal,
     select,
     update,
 )
+from sqlalchemy.exc import DBAPIError
+from sqlalchemy.exc import TimeoutError as NoneFree
 
-from .errors import StartError
-from .tables import MIGRATIONS, SCHEMA_VERSION, metadata, schema_version
+from .errors import ServiceError, StartError, Unavailable
+from .tables import MIGRATIONS, SCHEMA_VERSION, database_identity, metadata, schema_version
 
-BUSY_MILLISECONDS = 10_000
+log = logging.getLogger(__name__)
 
 
-class Database:
-    """One database file, opened; made on first use."""
+class Database(ABC):
+    """One database, opened; made on first use, brought up to date where it is older.
 
-    def __init__(self, path: Path):
-        self._engine = create_engine(
-            f"sqlite+pysqlite:///{path}", pool_size=5, max_overflow=50, pool_timeout=30
-        )
-        event.listen(self._engine, "connect", _prepare)
-        event.listen(self._engine, "begin", _begin)
-        self._writer = self._engine.execution_options(writing=True)
+    id : stands for it, wherever it is moved
+    shared : whether several services may use it at once
+    """
+
+    shared: bool
+
+    def __init__(self, name: str, reader: Engine, writer: Engine):
+        self._reader = reader
+        self._writer = writer
+        self._troubled = False
         try:
             with self.writing() as connection:
-                _check_schema(connection, path)
+                self.lock(connection, {"schema"})
+                _check_schema(connection, name)
+                self.id = connection.execute(select(database_identity.c.id)).scalar_one()
+        except ServiceError as error:
+            self.close()
+            raise StartError(str(error)) from None
         except BaseException:
             self.close()
             raise
 
-    def reading(self) -> AbstractContextManager[Connection]:
+    @contextmanager
+    def reading(self) -> Iterator[Connection]:
         """Transaction that sees one state of the database and changes nothing."""
-        return self._engine.begin()
+        with self._in_a_sentence(), self._reader.begin() as connection:
+            yield connection
 
-    def writing(self) -> AbstractContextManager[Connection]:
+    @contextmanager
+    def writing(self) -> Iterator[Connection]:
         """Transaction that commits durably at its end, or leaves no trace."""
-        return self._writer.begin()
+        with self._in_a_sentence(), self._writer.begin() as connection:
+            yield connection
 
+    @abstractmethod
     def lock(self, connection: Connection, names: Collection[str]) -> None:
-        """Hold what the names stand for to the end of a writing transaction.
-
-        Here nobody else can write before that anyway.
+        """Hold what the names stand for, against every service, to the end of a writing
+        transaction.
         """
 
     @property
+    @abstractmethod
     def now(self) -> ColumnElement[float]:
         """The time, in a statement, by the clock that all who use the database share."""
-        return literal(time.time(), Float)
+
+    @abstractmethod
+    def trouble(self, error: DBAPIError) -> ServiceError | None:
+        """What an error of the driver means to a person, None where it is a fault of ours."""
 
     def close(self) -> None:
         """Close every connection."""
-        self._engine.dispose()
+        self._reader.dispose()
+        self._writer.dispose()
+
+    @contextmanager
+    def _in_a_sentence(self) -> Iterator[None]:
+        """Neither reply nor log repeats what a driver says: it may name hosts and users."""
+        try:
+            yield
+        except NoneFree:
+            raise Unavailable(
+                "Too many requests wait for the database; try again shortly.", retry_after=5
+            ) from None
+        except DBAPIError as error:
+            if (trouble := self.trouble(error)) is None:
+                raise
+            if isinstance(trouble, Unavailable) and not self._troubled:
+                self._troubled = True
+                log.warning("%s", trouble)
+            raise trouble from None
+        else:
+            if self._troubled:
+                self._troubled = False
+                log.warning("the database can be used again")
 
 
-def _prepare(connection: Any, _: Any) -> None:
-    connection.isolation_level = None
-    for pragma in (
-        "journal_mode=WAL",
-        "synchronous=FULL",
-        f"busy_timeout={BUSY_MILLISECONDS}",
-        "foreign_keys=ON",
-    ):
-        connection.execute(f"PRAGMA {pragma}").close()
-
-
-def _begin(connection: Connection) -> None:
-    writing = connection.get_execution_options().get("writing", False)
-    connection.exec_driver_sql("BEGIN IMMEDIATE" if writing else "BEGIN")
-
-
-def _check_schema(connection: Connection, path: Path) -> None:
+def _check_schema(connection: Connection, name: str) -> None:
     if not inspect(connection).has_table(schema_version.name):
         metadata.create_all(connection)
         connection.execute(insert(schema_version).values(version=SCHEMA_VERSION))
@@ -99,6 +119,8 @@ def _check_schema(connection: Connection, path: Path) -> None:
         connection.execute(update(schema_version).values(version=SCHEMA_VERSION))
     elif version != SCHEMA_VERSION:
         raise StartError(
-            f"The database {path} has schema version {version}, this ridetune needs "
-            f"{SCHEMA_VERSION}; use the ridetune that wrote it, or another --data directory."
+            f"{name} has schema version {version}, this ridetune needs {SCHEMA_VERSION}; use the "
+            "ridetune that wrote it, or another --data directory."
         )
+    if connection.execute(select(database_identity.c.id)).one_or_none() is None:
+        connection.execute(insert(database_identity).values(id=secrets.token_hex(16)))

@@ -84,6 +84,19 @@ class Unavailable(ServiceError):
     code, status = "unavailable", 503
 
 
+class StorageFull(Unavailable):
+    """A disk of the service is full."""
+
+    code, status = "storage-full", 507
+
+    def __init__(self):
+        super().__init__(
+            "The disk of the service is full and nothing was kept; make room on it, or delete "
+            "measurements and jobs, then try again.",
+            retry_after=30,
+        )
+
+
 class Compiling(Unavailable):
     """The kernels are not compiled yet."""
 

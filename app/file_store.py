@@ -16,6 +16,7 @@ from .data_directory import DataDirectory
 from .database import Database
 from .errors import Busy, Unavailable
 from .settings import Limits
+from .storage import files_in_a_sentence
 from .tables import job_files, job_parts, jobs, mappings, measurements, uploads
 
 log = logging.getLogger(__name__)
@@ -37,7 +38,8 @@ class FileStore:
         by_hash = {hashlib.sha256(data).hexdigest(): data for data in files}
         self._lock(connection, by_hash)
         for sha256, data in by_hash.items():
-            self._directory.keep(sha256, data)
+            with files_in_a_sentence():
+                self._directory.keep(sha256, data)
             row = select(uploads.c.sha256).where(uploads.c.sha256 == sha256)
             if connection.execute(row).one_or_none() is None:
                 connection.execute(
@@ -100,9 +102,10 @@ class FileStore:
             self._lock(connection, names)
             rows = select(uploads.c.sha256).where(uploads.c.sha256.in_(names))
             kept = set(connection.execute(rows).scalars())
-            for name in names:
-                if name not in kept:
-                    self._directory.drop(name)
+            with files_in_a_sentence():
+                for name in names:
+                    if name not in kept:
+                        self._directory.drop(name)
 
     def _lock(self, connection: Connection, names: Iterable[str]) -> None:
         self._database.lock(connection, {f"originals/{name[:2]}" for name in names})

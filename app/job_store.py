@@ -187,13 +187,17 @@ class JobStore:
 
         Whichever of them was asked to stop is cancelled instead.
         """
+        now = self._database.now
+        # Also where a clock went back, the lease has run out.
+        lapsed = func.abs(jobs.c.heartbeat_at - now) > LEASE
+        free = jobs.c.state.in_(UNFINISHED) & or_(
+            jobs.c.owner.is_(None), (jobs.c.owner != owner) & lapsed
+        )
+        with self._database.reading() as connection:
+            # Mostly there is none, and nobody's writing is held up.
+            if connection.execute(select(jobs.c.id).where(free).limit(1)).first() is None:
+                return []
         with self._database.writing() as connection:
-            now = self._database.now
-            # Also where a clock went back, the lease has run out.
-            lapsed = func.abs(jobs.c.heartbeat_at - now) > LEASE
-            free = jobs.c.state.in_(UNFINISHED) & or_(
-                jobs.c.owner.is_(None), (jobs.c.owner != owner) & lapsed
-            )
             stopped = select(jobs.c.id).where(free, jobs.c.cancel_asked)
             order = (jobs.c.priority.desc(), jobs.c.created, jobs.c.id)
             waiting = select(jobs.c.id).where(free, ~jobs.c.cancel_asked).order_by(*order)

@@ -116,7 +116,7 @@ def create_app(
 def _services(
     settings: Settings, store: Store | None, warm_up: Callable[[WarmUp], object]
 ) -> Services:
-    store = store or Store(settings.data, settings.limits)
+    store = store or Store(settings.data, settings.limits, settings.database)
     recordings = Recordings(store)
     warmup = WarmUp(warm_up)
     return Services(

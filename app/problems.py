@@ -15,6 +15,7 @@ from starlette.exceptions import HTTPException
 
 from ..engine.errors import RideError
 from .errors import InvalidRequest, ServiceError
+from .storage import trouble_of
 
 log = logging.getLogger(__name__)
 
@@ -58,6 +59,13 @@ def reply_to_errors(app: FastAPI) -> None:
     @app.exception_handler(RideError)
     async def ride_error(_: Request, error: RideError) -> JSONResponse:
         return reply_to(error)
+
+    @app.exception_handler(OSError)
+    async def disk_error(_: Request, error: OSError) -> JSONResponse:
+        if (trouble := trouble_of(error)) is None:
+            raise error
+        log.error("%s: %s", trouble, error.strerror)
+        return reply_to(trouble)
 
     @app.exception_handler(RequestValidationError)
     async def invalid_request(_: Request, error: RequestValidationError) -> JSONResponse:

@@ -26,7 +26,7 @@ def serve(settings: Settings) -> None:
     _allow_many_files()
     _find_cache(settings)
     with _listen(settings) as listener:
-        store = Store(settings.data, settings.limits)
+        store = Store(settings.data, settings.limits, settings.database)
         host, port = listener.getsockname()[:2]
         shown = f"[{host}]" if ":" in host else host
         invitation = "?token=<RIDETUNE_TOKEN>" if settings.token else ""

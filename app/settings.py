@@ -1,8 +1,8 @@
 """What the service is told from outside: where its data lives, where it listens, how much it takes.
 
 Every setting has an environment variable: RIDETUNE_DATA, RIDETUNE_HOST, RIDETUNE_PORT,
-RIDETUNE_TOKEN, RIDETUNE_ALLOWED_HOSTS (comma separated), RIDETUNE_CLUSTER, and for each limit
-RIDETUNE_LIMIT_ followed by its name in capitals.
+RIDETUNE_TOKEN, RIDETUNE_ALLOWED_HOSTS (comma separated), RIDETUNE_CLUSTER, RIDETUNE_DATABASE, and
+for each limit RIDETUNE_LIMIT_ followed by its name in capitals.
 """
 
 import dataclasses
@@ -52,7 +52,11 @@ class Limits:
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """One service: `cluster` empty means workers of its own, else a Dask scheduler's address."""
+    """One service.
+
+    cluster : empty for workers of its own, else a Dask scheduler's address
+    database : empty for SQLite in the data directory, else a PostgreSQL URL
+    """
 
     data: Path
     host: str = "127.0.0.1"
@@ -60,6 +64,7 @@ class Settings:
     token: str = ""
     allowed_hosts: tuple[str, ...] = ()
     cluster: str = ""
+    database: str = field(default="", repr=False)
     limits: Limits = field(default_factory=Limits)
 
     @classmethod
@@ -80,6 +85,7 @@ class Settings:
             token=environment.get("RIDETUNE_TOKEN", ""),
             allowed_hosts=tuple(name.strip() for name in allowed.split(",") if name.strip()),
             cluster=environment.get("RIDETUNE_CLUSTER", ""),
+            database=environment.get("RIDETUNE_DATABASE", ""),
             limits=_limits(environment),
         )
 

@@ -16,23 +16,27 @@ from .file_store import FileStore
 from .job_store import UNFINISHED, JobStore
 from .mapping_store import MappingStore
 from .measurement_store import MeasurementStore
+from .postgresql import PostgresqlDatabase
 from .session_store import SessionStore
 from .settings import Limits
 from .setup_store import SetupStore
+from .sqlite import SqliteDatabase
+from .storage import files_in_a_sentence
 from .tables import job_parts, jobs
+
+RESTING = 3600.0
+"""How long nothing happens to what is left of a file that was being read, s."""
 
 
 class Store:
-    """Everything kept in one data directory; opening it locks the directory."""
+    """Everything kept by one service; with SQLite, opening it locks the data directory.
 
-    def __init__(self, path: Path, limits: Limits):
+    database : empty for SQLite in the data directory, else a PostgreSQL URL
+    """
+
+    def __init__(self, path: Path, limits: Limits, database: str = ""):
         self.limits = limits
-        self.directory = DataDirectory(path)
-        try:
-            self.database = Database(self.directory.database)
-        except BaseException:
-            self.directory.close()
-            raise
+        self.database, self.directory = _open_shared(path, database) if database else _open(path)
         self.files = FileStore(self.database, self.directory, limits)
         self.jobs = JobStore(self.database, limits)
         self.setups = SetupStore(self.database, limits)
@@ -41,9 +45,12 @@ class Store:
             self.database, self.directory, limits, self.files, self.jobs
         )
         self.sessions = SessionStore(self.database, limits, self.files, self.measurements)
-        # The lock of the directory tells that whoever ran them is gone.
-        self.jobs.take_back_all()
-        self.directory.sweep()
+        if self.database.shared:
+            self.directory.sweep(older=RESTING)
+        else:
+            # The lock of the directory tells that whoever was at them is gone.
+            self.directory.sweep()
+            self.jobs.take_back_all()
         self.files.sweep()
 
     def close(self) -> None:
@@ -97,9 +104,28 @@ class Store:
             ).scalar_one_or_none()
         if sha256 is None:
             raise NotFound(f"There is no part {name} of the job {job} any more.")
-        return self.directory.original(sha256).read_bytes()
+        with files_in_a_sentence():
+            return self.directory.original(sha256).read_bytes()
 
     def delete_job(self, session: str, job: str) -> None:
         """Remove a job with its result, its file and its parts."""
         self.jobs.delete(session, job)
         self.files.drop_unreferenced()
+
+
+def _open(path: Path) -> tuple[Database, DataDirectory]:
+    directory = DataDirectory(path)
+    try:
+        return SqliteDatabase(directory.database), directory
+    except BaseException:
+        directory.close()
+        raise
+
+
+def _open_shared(path: Path, url: str) -> tuple[Database, DataDirectory]:
+    database = PostgresqlDatabase(url)
+    try:
+        return database, DataDirectory(path, database.id)
+    except BaseException:
+        database.close()
+        raise

@@ -6,6 +6,7 @@ and so is each part of it that is kept while it runs.
 """
 
 from sqlalchemy import (
+    BigInteger,
     Boolean,
     Column,
     Float,
@@ -43,6 +44,8 @@ metadata = MetaData()
 
 schema_version = Table("schema_version", metadata, Column("version", Integer, nullable=False))
 
+database_identity = Table("database_identity", metadata, Column("id", String(32), nullable=False))
+
 
 def _session() -> Column[str]:
     return Column(
@@ -67,7 +70,7 @@ uploads = Table(
     "uploads",
     metadata,
     Column("sha256", String(64), primary_key=True),
-    Column("bytes", Integer, nullable=False),
+    Column("bytes", BigInteger, nullable=False),
     Column("created", Float, nullable=False),
 )
 

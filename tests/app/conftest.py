@@ -19,6 +19,7 @@ from ridetune.app.main import create_app
 from ridetune.app.settings import Limits, Settings
 
 from .command_line import SHORT
+from .postgresql_server import PostgresqlServer
 
 ADDRESS = "http://127.0.0.1:8000"
 SAMPLES = Path(__file__).parents[2] / "sample_runs"
@@ -95,6 +96,27 @@ def workers() -> Iterator[str]:
         silence_logs=logging.ERROR,
     ) as cluster:
         yield cluster.scheduler_address
+
+
+@pytest.fixture(scope="session")
+def postgresql() -> Iterator[PostgresqlServer]:
+    """A server for the tests that need one."""
+    server = PostgresqlServer()
+    yield server
+    server.close()
+
+
+@pytest.fixture
+def on_postgresql(postgresql) -> Iterator[str]:
+    """The URL of an empty database."""
+    with postgresql.database() as url:
+        yield url
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def database(request) -> str:
+    """What `Store` and `Settings` are told of the database: each that there is, empty."""
+    return "" if request.param == "sqlite" else request.getfixturevalue("on_postgresql")
 
 
 @pytest.fixture

@@ -1,7 +1,5 @@
 """Who runs a job: claims, leases, hand-overs; and the parts that are kept while it runs."""
 
-import time
-
 import pytest
 from ridetune.app.errors import Busy, NotFound
 from ridetune.app.job_store import LEASE
@@ -13,8 +11,8 @@ CAR = {"name": "a car"}
 
 
 @pytest.fixture
-def store(tmp_path):
-    store = Store(tmp_path / "data", Limits(unfinished_jobs=10))
+def store(tmp_path, database):
+    store = Store(tmp_path / "data", Limits(unfinished_jobs=10), database)
     yield store
     store.close()
 
@@ -25,12 +23,13 @@ def session(store) -> str:
 
 
 @pytest.fixture
-def later(monkeypatch):
-    """Set the clock on by some seconds, or back."""
-    true = time.time
+def later(store, monkeypatch):
+    """Set the database's clock on by some seconds, or back."""
+    kind = type(store.database)
+    true = kind.now.fget
 
     def set_on(seconds: float) -> None:
-        monkeypatch.setattr("ridetune.app.database.time.time", lambda: true() + seconds)
+        monkeypatch.setattr(kind, "now", property(lambda one: true(one) + seconds))
 
     return set_on
 
@@ -131,7 +130,7 @@ def test_what_is_handed_over_counts_as_no_crash(store, session):
     assert (kept.restarts, kept.attempts) == (0, 0)
 
 
-def test_after_a_crash_everything_is_claimable_at_once(tmp_path):
+def test_after_a_crash_everything_is_claimable_at_once_with_sqlite(tmp_path):
     """The lock of the data directory tells that its owner is gone, before the lease has run out."""
     store = Store(tmp_path, Limits())
     session, _ = store.sessions.create(CAR, [])
@@ -182,16 +181,16 @@ def originals(store: Store) -> set[bytes]:
     return {file.read_bytes() for file in store.directory.originals.glob("*/*")}
 
 
-def test_parts_are_kept_until_the_job_ends(tmp_path):
+def test_parts_are_kept_until_the_job_ends(tmp_path, database):
     """The first one under a name stays; what comes after the end is not kept."""
-    store = Store(tmp_path, Limits())
+    store = Store(tmp_path, Limits(), database)
     session, _ = store.sessions.create(CAR, [])
     job = queued(store, session)
     assert store.part_names(job) == []
     assert all(store.keep_part(job, name, name.encode()) for name in "ba")
     assert store.keep_part(job, "a", b"again")
     store.close()
-    store = Store(tmp_path, Limits())
+    store = Store(tmp_path, Limits(), database)
     assert store.part_names(job) == ["a", "b"]
     assert store.part(job, "a") == b"a"
     assert originals(store) == {b"a", b"b"}
@@ -221,8 +220,8 @@ def test_parts_go_with_their_job_however_it_goes(store, session, end):
     assert originals(store) == set()
 
 
-def test_parts_count_in_the_session_s_bytes(tmp_path):
-    store = Store(tmp_path, Limits(session_bytes=10))
+def test_parts_count_in_the_session_s_bytes(tmp_path, database):
+    store = Store(tmp_path, Limits(session_bytes=10), database)
     session, _ = store.sessions.create(CAR, [])
     job = queued(store, session)
     for name in "ab":

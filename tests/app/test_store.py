@@ -21,8 +21,8 @@ CAR = {"name": "a car"}
 
 
 @pytest.fixture
-def store(tmp_path):
-    store = Store(tmp_path / "data", Limits(unfinished_jobs=2, session_jobs=3))
+def store(tmp_path, database):
+    store = Store(tmp_path / "data", Limits(unfinished_jobs=2, session_jobs=3), database)
     yield store
     store.close()
 
@@ -74,8 +74,9 @@ def test_a_directory_that_cannot_be_made_is_named(tmp_path):
         DataDirectory(tmp_path / "file" / "below")
 
 
-def test_the_database_flushes_every_commit_and_checks_references(store):
+def test_sqlite_flushes_every_commit_and_checks_references(tmp_path):
     """WAL, synchronous=FULL (2), foreign keys on: read back from the connection itself."""
+    store = Store(tmp_path, Limits())
     with store.database.reading() as connection:
         answers = {
             name: connection.exec_driver_sql(f"PRAGMA {name}").scalar()
@@ -87,6 +88,7 @@ def test_the_database_flushes_every_commit_and_checks_references(store):
         "foreign_keys": 1,
         "busy_timeout": 10_000,
     }
+    store.close()
 
 
 def test_a_database_of_another_version_is_refused(tmp_path):
@@ -146,15 +148,15 @@ def test_a_database_of_an_earlier_version_is_taken_over(tmp_path, version):
     store.close()
 
 
-def test_everything_is_there_after_reopening(tmp_path):
-    store = Store(tmp_path, Limits())
+def test_everything_is_there_after_reopening(tmp_path, database):
+    store = Store(tmp_path, Limits(), database)
     session, token = store.sessions.create(CAR, [recording(b"sample")])
     kept = store.measurements.add(session, recording())
     job = queued(store, session)
     store.finish_job(job, "done", result={"cost": 1.5})
     store.close()
 
-    store = Store(tmp_path, Limits())
+    store = Store(tmp_path, Limits(), database)
     assert store.sessions.holds(session, token)
     assert store.sessions.get(session).vehicle == CAR
     assert [one.name for one in store.measurements.of_session(session)] == ["run.csv", "run.csv"]
@@ -167,9 +169,9 @@ def test_everything_is_there_after_reopening(tmp_path):
     store.close()
 
 
-def test_leftovers_of_a_crash_are_swept_and_originals_stay(tmp_path):
+def test_leftovers_of_a_crash_are_swept_and_originals_stay(tmp_path, database):
     """A half-written file and one whose row was never committed."""
-    store = Store(tmp_path, Limits())
+    store = Store(tmp_path, Limits(), database)
     session, _ = store.sessions.create(CAR, [])
     kept = store.measurements.original(store.measurements.add(session, recording()))
     store.close()
@@ -178,7 +180,7 @@ def test_leftovers_of_a_crash_are_swept_and_originals_stay(tmp_path):
     half = kept.with_suffix(".tmp")
     for leftover in (orphan, half):
         leftover.write_bytes(b"?")
-    Store(tmp_path, Limits()).close()
+    Store(tmp_path, Limits(), database).close()
     assert kept.read_bytes() == b"0 1 2"
     assert not orphan.exists()
     assert not half.exists()
@@ -220,9 +222,9 @@ def test_a_token_opens_its_own_session_only(store):
     assert not store.sessions.holds("nobody", first_token)
 
 
-def test_room_is_made_from_sessions_nobody_used(tmp_path, monkeypatch):
+def test_room_is_made_from_sessions_nobody_used(tmp_path, database, monkeypatch):
     """A session with something of its own stays; one that only looked goes after an hour."""
-    store = Store(tmp_path, Limits(sessions=2))
+    store = Store(tmp_path, Limits(sessions=2), database)
     used, used_token = store.sessions.create(CAR, [])
     store.sessions.set_vehicle(used, {"name": "mine"})
     looked, looked_token = store.sessions.create(CAR, [])
@@ -308,22 +310,22 @@ def test_a_job_s_file_goes_with_its_last_owner(store, session):
     assert not file.exists()
 
 
-def test_a_job_s_file_outlives_a_restart_and_one_that_came_too_late_is_not_kept(tmp_path):
-    store = Store(tmp_path, Limits())
+def test_a_job_s_file_outlives_a_restart_and_one_that_came_too_late_is_not_kept(tmp_path, database):
+    store = Store(tmp_path, Limits(), database)
     session, _ = store.sessions.create(CAR, [])
     _, kept = made(store, session, b"rows")
     cancelled = queued(store, session)
     store.finish_job(cancelled, "cancelled")
     assert not store.finish_job(cancelled, "done", result={}, file=b"late")
     store.close()
-    store = Store(tmp_path, Limits())
+    store = Store(tmp_path, Limits(), database)
     assert kept.read_bytes() == b"rows"
     assert [file.name for file in store.directory.originals.glob("*/*")] == [kept.name]
     store.close()
 
 
-def test_files_of_jobs_take_their_share_of_the_session(tmp_path):
-    store = Store(tmp_path, Limits(session_bytes=10))
+def test_files_of_jobs_take_their_share_of_the_session(tmp_path, database):
+    store = Store(tmp_path, Limits(session_bytes=10), database)
     session, _ = store.sessions.create(CAR, [])
     job, _ = made(store, session, b"1234567")
     store.files.require_room(session, 3)
@@ -336,9 +338,9 @@ def test_files_of_jobs_take_their_share_of_the_session(tmp_path):
     store.close()
 
 
-def test_manoeuvres_take_their_share_of_the_session(tmp_path):
+def test_manoeuvres_take_their_share_of_the_session(tmp_path, database):
     """Oracle: {"name": "..."} has 12 characters besides the name."""
-    store = Store(tmp_path, Limits(session_bytes=100))
+    store = Store(tmp_path, Limits(session_bytes=100), database)
     session, _ = store.sessions.create(CAR, [])
     one, other = (store.measurements.add(session, recording(b"12345")) for _ in range(2))
     store.measurements.set_manoeuvre(session, one.id, {"name": "x" * 68})
@@ -351,9 +353,9 @@ def test_manoeuvres_take_their_share_of_the_session(tmp_path):
     store.close()
 
 
-def test_mappings_are_kept_by_name_and_take_their_share_of_the_session(tmp_path):
+def test_mappings_are_kept_by_name_and_take_their_share_of_the_session(tmp_path, database):
     """Oracle: {"a": "..."} has 9 characters besides what is between the quotes."""
-    store = Store(tmp_path, Limits(session_bytes=100))
+    store = Store(tmp_path, Limits(session_bytes=100), database)
     (session, _), (other, _) = (store.sessions.create(CAR, []) for _ in "ab")
     store.mappings.keep(session, "first", {"a": "x" * 31})
     store.mappings.keep(session, "second", {"a": ""})
@@ -405,3 +407,13 @@ def test_what_was_being_read_when_the_service_was_killed_is_removed(tmp_path):
     (tmp_path / "reading/upload").write_bytes(b"2")
     Store(tmp_path, Limits()).close()
     assert list((tmp_path / "reading").iterdir()) == []
+
+
+def test_what_another_service_reads_stays_in_a_shared_directory(tmp_path, on_postgresql):
+    """Only what is so old that nobody can be reading it any more goes."""
+    fresh, old = tmp_path / "reading/fresh", tmp_path / "reading/old"
+    fresh.mkdir(parents=True)
+    old.mkdir()
+    os.utime(old, (0, 0))
+    Store(tmp_path, Limits(), on_postgresql).close()
+    assert list((tmp_path / "reading").iterdir()) == [fresh]
