@@ -18,6 +18,7 @@ from typing import Any
 
 from ..engine.errors import RideError
 from .cluster import Cluster
+from .errors import Unavailable
 from .job_store import Job
 from .schemas import WireForm
 from .store import Store
@@ -92,7 +93,9 @@ class Jobs:
             executor.shutdown(cancel_futures=True)
         self._cluster.close()
         self._recorder.shutdown()
-        self._store.jobs.release(self._owner)
+        # Where it cannot be told, the lease runs out.
+        with contextlib.suppress(Unavailable):
+            self._store.jobs.release(self._owner)
 
     def submit(self, session: str, kind: str, spec: Mapping[str, Any], key: str | None) -> Job:
         """Keep a job durably, then send it off; the same key gives the same job."""
