@@ -17,6 +17,7 @@ from . import (
     routes_campaigns,
     routes_catalogue,
     routes_conditioning,
+    routes_health,
     routes_identifications,
     routes_mappings,
     routes_measurements,
@@ -30,6 +31,7 @@ from . import (
 from .campaign_job import KIND as CAMPAIGN
 from .campaign_job import campaign
 from .cluster import Cluster
+from .draining import Drain, Draining
 from .guard import Guard
 from .identification_job import KIND as IDENTIFICATION
 from .identification_job import identify_runs, of_recordings
@@ -39,6 +41,7 @@ from .pool import Pool
 from .problems import reply_to_errors
 from .profile_job import KIND as PROFILE
 from .profile_job import profile_parameter
+from .readiness import Readiness
 from .recordings import Recordings
 from .services import Services, Viewers
 from .settings import Limits, Settings
@@ -62,9 +65,11 @@ def create_app(
 ) -> FastAPI:
     """The service; its data directory is locked from here or from start-up until it stops."""
 
+    draining = Draining()
+
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        services = _services(settings, store, warm_up)
+        services = _services(settings, store, warm_up, draining)
         app.state.services = services
         services.warmup.start()
         services.jobs.start(asyncio.get_running_loop())
@@ -101,6 +106,7 @@ def create_app(
         routes_advice,
         routes_campaigns,
         routes_page,
+        routes_health,
     ):
         app.include_router(part.router)
     if find_spec(".viewer", __package__):
@@ -109,12 +115,18 @@ def create_app(
         app.include_router(router)
     app.mount("/static", StaticFiles(directory=package_folder("static")))
     reply_to_errors(app)
+    # The last one is the outermost.
+    app.add_middleware(Drain, draining=draining)
     app.add_middleware(Guard, settings=settings)
+    app.state.draining = draining
     return app
 
 
 def _services(
-    settings: Settings, store: Store | None, warm_up: Callable[[WarmUp], object]
+    settings: Settings,
+    store: Store | None,
+    warm_up: Callable[[WarmUp], object],
+    draining: Draining,
 ) -> Services:
     store = store or Store(settings.data, settings.limits, settings.database)
     recordings = Recordings(store)
@@ -135,9 +147,13 @@ def _services(
                 SWEEP: sweep(store, recordings),
                 VALIDATION: validation(store, recordings),
             },
-            ready=warmup.wait,
+            ready=lambda: warmup.wait() and not draining.begun,
         ),
         warmup=warmup,
+        draining=draining,
+        readiness=Readiness(
+            draining, warmup, store.database, store.directory.path, settings.cluster
+        ),
         viewers=_viewers(),
     )
 

@@ -7,8 +7,10 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 from ..engine.vehicle import Vehicle
+from .draining import Draining
 from .jobs import Jobs
 from .pool import Pool
+from .readiness import Readiness
 from .recordings import Recordings
 from .settings import Settings
 from .store import Store
@@ -46,6 +48,8 @@ class Services:
     readers: Pool
     jobs: Jobs
     warmup: WarmUp
+    draining: Draining
+    readiness: Readiness
     viewers: Viewers | None = None
 
 

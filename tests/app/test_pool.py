@@ -2,24 +2,17 @@
 
 import asyncio
 import threading
-from collections.abc import Callable, Coroutine
-from concurrent.futures import ThreadPoolExecutor
-from typing import Any
 
 import pytest
 from ridetune.app.errors import Busy, Unavailable
 from ridetune.app.pool import Pool
 
+from .loop import in_a_loop
+
 
 def pool_of(**told: int) -> Pool:
     """One that takes much, one at a time, unless told otherwise."""
     return Pool("simulations", **({"width": 1, "share": 9, "most": 99, "at_once": 9} | told))
-
-
-def in_a_loop(run: Callable[[], Coroutine[Any, Any, Any]]) -> Any:
-    """What a coroutine returns, in a thread of its own: a browser's loop may run in this one."""
-    with ThreadPoolExecutor(1) as pool:
-        return pool.submit(lambda: asyncio.run(run())).result()
 
 
 def test_no_more_runs_at_once_than_the_pool_is_wide():
