@@ -61,6 +61,11 @@ class Drain:
             try:
                 await self.app(scope, ways.receive, ways.send)
                 await ways.end()
+            except asyncio.CancelledError:
+                # Its grace is over; what has begun to answer cannot be told.
+                if ways.answered or not self.draining.begun:
+                    raise
+                await _refuse(scope, receive, send)
             finally:
                 self.draining.under_way -= 1
                 ways.close()
@@ -83,7 +88,7 @@ class _Ways:
     def __init__(self, scope: Scope, receive: Receive, send: Send, draining: Draining):
         self._receive, self._send, self._draining = receive, send, draining
         self._socket = self._endless = scope["type"] == "websocket"
-        self._whole = self._open = self._cut = False
+        self._whole = self._open = self._cut = self.answered = False
         self._news: asyncio.Future[Message] | None = None
 
     async def receive(self) -> Message:
@@ -112,6 +117,7 @@ class _Ways:
         if message["type"] == "http.response.start":
             kind = Headers(raw=message["headers"]).get("content-type", "")
             self._endless = kind.startswith("text/event-stream")
+        self.answered = True
         self._open = message["type"] != "websocket.close" and message.get("more_body", True)
         await self._send(message)
 

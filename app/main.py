@@ -193,13 +193,16 @@ def _viewers() -> Viewers | None:
 
 
 def _close(services: Services) -> None:
-    services.warmup.close()
-    services.interactive.close()
-    services.readers.close()
-    services.jobs.close()
-    if services.viewers is not None:
-        services.viewers.close()
-    services.store.close()
+    """End the parts, those first that others serve; one that fails leaves none of them open."""
+    with contextlib.ExitStack() as last_first:
+        last_first.callback(services.store.close)
+        if services.viewers is not None:
+            last_first.callback(services.viewers.close)
+        # Jobs are handed back once no request adds one any more.
+        last_first.callback(services.jobs.close)
+        last_first.callback(services.readers.close)
+        last_first.callback(services.interactive.close)
+        last_first.callback(services.warmup.close)
 
 
 async def _reap(viewers: Viewers | None) -> None:

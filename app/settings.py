@@ -1,8 +1,8 @@
 """What the service is told from outside: where its data lives, where it listens, how much it takes.
 
 Every setting has an environment variable: RIDETUNE_DATA, RIDETUNE_HOST, RIDETUNE_PORT,
-RIDETUNE_TOKEN, RIDETUNE_ALLOWED_HOSTS (comma separated), RIDETUNE_CLUSTER, RIDETUNE_DATABASE, and
-for each limit RIDETUNE_LIMIT_ followed by its name in capitals.
+RIDETUNE_TOKEN, RIDETUNE_ALLOWED_HOSTS (comma separated), RIDETUNE_CLUSTER, RIDETUNE_DATABASE, RIDETUNE_GRACE,
+RIDETUNE_NOTICE, and for each limit RIDETUNE_LIMIT_ followed by its name in capitals.
 """
 
 import dataclasses
@@ -56,6 +56,8 @@ class Settings:
 
     cluster : empty for workers of its own, else a Dask scheduler's address
     database : empty for SQLite in the data directory, else a PostgreSQL URL
+    grace : how long requests under way may take when the service is told to end, s
+    notice : how long it says that it ends before it does, s
     """
 
     data: Path
@@ -65,6 +67,8 @@ class Settings:
     allowed_hosts: tuple[str, ...] = ()
     cluster: str = ""
     database: str = field(default="", repr=False)
+    grace: float = 10.0
+    notice: float = 0.0
     limits: Limits = field(default_factory=Limits)
 
     @classmethod
@@ -86,6 +90,8 @@ class Settings:
             allowed_hosts=tuple(name.strip() for name in allowed.split(",") if name.strip()),
             cluster=environment.get("RIDETUNE_CLUSTER", ""),
             database=environment.get("RIDETUNE_DATABASE", ""),
+            grace=_seconds("RIDETUNE_GRACE", environment, cls.grace),
+            notice=_seconds("RIDETUNE_NOTICE", environment, cls.notice),
             limits=_limits(environment),
         )
 
@@ -127,6 +133,14 @@ def _port(value: int | str) -> int:
     if not 0 <= port <= 65535:
         raise StartError(f"The port {value!r} is not a number from 0 to 65535; give another one.")
     return port
+
+
+def _seconds(variable: str, environment: Mapping[str, str], default: float) -> float:
+    text = environment.get(variable, "")
+    with suppress(ValueError):
+        if 0 <= (seconds := float(text or default)) < math.inf:
+            return seconds
+    raise StartError(f"{variable} is {text!r}; give a number of seconds, 0 or more.")
 
 
 def _limits(environment: Mapping[str, str]) -> Limits:

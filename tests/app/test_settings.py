@@ -24,6 +24,8 @@ def test_limits_are_set_one_by_one():
     [
         ("RIDETUNE_PORT", "http"),
         ("RIDETUNE_PORT", "70000"),
+        ("RIDETUNE_GRACE", "-1"),
+        ("RIDETUNE_NOTICE", "soon"),
         ("RIDETUNE_LIMIT_SESSIONS", "many"),
         ("RIDETUNE_LIMIT_SESSIONS", "-1"),
         ("RIDETUNE_LIMIT_SESSIONS", "2.5"),
