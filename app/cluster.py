@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from . import worker
+from . import logs, worker
 from .errors import Unavailable
 
 log = logging.getLogger(__name__)
@@ -203,6 +203,7 @@ class Cluster:
 
         config.set(CONFIGURATION)
         logging.getLogger("distributed").setLevel(logging.ERROR)
+        logs.adopt("distributed")
         if self._address:
             return Client(self._address, set_as_default=False, name="ridetune", timeout=LOOK_EVERY)
         no_dashboard: Any = None
@@ -253,7 +254,8 @@ class Cluster:
         if task is None or task.future is not future:
             return
         lost = future.status not in ("finished", "error") and not task.cancelled
-        ending = _ending_of(task, future)
+        with logs.about(**worker.about(name)):
+            ending = _ending_of(task, future)
         with self._lock:
             if self._closed or self._tasks.get(name) is not task:
                 return

@@ -36,9 +36,10 @@ from .guard import Guard
 from .identification_job import KIND as IDENTIFICATION
 from .identification_job import identify_runs, of_recordings
 from .jobs import Jobs
+from .observed import Observed
 from .package_files import package_folder
 from .pool import Pool
-from .problems import reply_to_errors
+from .problems import Unexpected, reply_to_errors
 from .profile_job import KIND as PROFILE
 from .profile_job import profile_parameter
 from .readiness import Readiness
@@ -116,8 +117,10 @@ def create_app(
     app.mount("/static", StaticFiles(directory=package_folder("static")))
     reply_to_errors(app)
     # The last one is the outermost.
+    app.add_middleware(Unexpected)
     app.add_middleware(Drain, draining=draining)
     app.add_middleware(Guard, settings=settings)
+    app.add_middleware(Observed)
     app.state.draining = draining
     return app
 

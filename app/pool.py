@@ -9,6 +9,7 @@ import asyncio
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
 from typing import TypeVar
 
 from .errors import Busy, Unavailable
@@ -58,7 +59,11 @@ class Pool:
         turn = self._turns.setdefault(session, asyncio.Semaphore(self._at_once))
         try:
             async with turn:
-                return await asyncio.get_running_loop().run_in_executor(self._pool, work)
+                # What its log records are about goes along.
+                known = copy_context()
+                return await asyncio.get_running_loop().run_in_executor(
+                    self._pool, lambda: known.run(work)
+                )
         finally:
             self._under_way[session] -= 1
             if not self._under_way[session]:

@@ -1,6 +1,5 @@
 """Run the service until it is told to stop."""
 
-import logging
 import os
 import resource
 import socket
@@ -8,6 +7,7 @@ from pathlib import Path
 
 import uvicorn
 
+from . import logs
 from .errors import StartError
 from .main import create_app
 from .server import CUT_OFF_SECONDS, Server
@@ -21,7 +21,7 @@ WAITING = 1024
 def serve(settings: Settings) -> None:
     """Serve; StartError with a sentence if the address or the data directory cannot be had."""
     settings.check_bind()
-    logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
+    logs.configure(settings.log, settings.log_level)
     _allow_many_files()
     _find_cache(settings)
     with _listen(settings) as listener:
@@ -33,6 +33,7 @@ def serve(settings: Settings) -> None:
         app = create_app(settings, store=store)
         config = uvicorn.Config(
             app,
+            log_config=None,
             log_level="warning",
             access_log=False,
             server_header=False,

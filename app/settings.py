@@ -1,8 +1,9 @@
 """What the service is told from outside: where its data lives, where it listens, how much it takes.
 
 Every setting has an environment variable: RIDETUNE_DATA, RIDETUNE_HOST, RIDETUNE_PORT,
-RIDETUNE_TOKEN, RIDETUNE_ALLOWED_HOSTS (comma separated), RIDETUNE_CLUSTER, RIDETUNE_DATABASE, RIDETUNE_GRACE,
-RIDETUNE_NOTICE, and for each limit RIDETUNE_LIMIT_ followed by its name in capitals.
+RIDETUNE_TOKEN, RIDETUNE_ALLOWED_HOSTS (comma separated), RIDETUNE_CLUSTER, RIDETUNE_DATABASE,
+RIDETUNE_GRACE, RIDETUNE_NOTICE, RIDETUNE_LOG, RIDETUNE_LOG_LEVEL, and for each limit
+RIDETUNE_LIMIT_ followed by its name in capitals.
 """
 
 import dataclasses
@@ -14,11 +15,14 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
+from . import logs
 from .errors import StartError
 
 LIMIT = "RIDETUNE_LIMIT_"
+
+Choice = TypeVar("Choice", bound=str)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +62,7 @@ class Settings:
     database : empty for SQLite in the data directory, else a PostgreSQL URL
     grace : how long requests under way may take when the service is told to end, s
     notice : how long it says that it ends before it does, s
+    log, log_level : the form of log records, and which of our own are written
     """
 
     data: Path
@@ -69,6 +74,8 @@ class Settings:
     database: str = field(default="", repr=False)
     grace: float = 10.0
     notice: float = 0.0
+    log: logs.Form = "text"
+    log_level: str = "WARNING"
     limits: Limits = field(default_factory=Limits)
 
     @classmethod
@@ -92,6 +99,8 @@ class Settings:
             database=environment.get("RIDETUNE_DATABASE", ""),
             grace=_seconds("RIDETUNE_GRACE", environment, cls.grace),
             notice=_seconds("RIDETUNE_NOTICE", environment, cls.notice),
+            log=_one_of(logs.FORMS, logs.FORM, environment, cls.log),
+            log_level=_one_of(logs.LEVELS, logs.LEVEL, environment, cls.log_level),
             limits=_limits(environment),
         )
 
@@ -133,6 +142,16 @@ def _port(value: int | str) -> int:
     if not 0 <= port <= 65535:
         raise StartError(f"The port {value!r} is not a number from 0 to 65535; give another one.")
     return port
+
+
+def _one_of(
+    known: tuple[Choice, ...], variable: str, environment: Mapping[str, str], default: Choice
+) -> Choice:
+    stated = environment.get(variable) or default
+    for choice in known:
+        if choice == stated:
+            return choice
+    raise StartError(f"{variable} is {stated!r}; give one of {', '.join(known)}.")
 
 
 def _seconds(variable: str, environment: Mapping[str, str], default: float) -> float:

@@ -1,5 +1,6 @@
 """The seam to Dask: results, progress, cancelling, lost workers. One local cluster for all."""
 
+import json
 import queue
 import time
 
@@ -74,6 +75,15 @@ def test_a_task_gives_its_result_and_reports_on_the_way(cluster, heard):
     assert heard.started.get(timeout=1) == "double"
     told = [heard.progress.get(timeout=1) for _ in range(2)]
     assert told == [("double", {"cost": 1.0}), ("double", {"cost": 0.5})]
+
+
+def test_a_worker_logs_as_the_service_does_and_names_the_job(cluster, heard):
+    cluster.submit("noted/7", tasks.note, "half way", heard)
+    told = heard.end_of("noted/7")["result"]
+    assert told is not None
+    assert told["formatter"] == "TextLines"
+    line = json.loads(told["line"])
+    assert [line[name] for name in ("job", "unit", "message")] == ["noted", "7", "half way"]
 
 
 def test_a_file_comes_back_byte_for_byte(cluster, heard):

@@ -26,6 +26,8 @@ def test_limits_are_set_one_by_one():
         ("RIDETUNE_PORT", "70000"),
         ("RIDETUNE_GRACE", "-1"),
         ("RIDETUNE_NOTICE", "soon"),
+        ("RIDETUNE_LOG", "xml"),
+        ("RIDETUNE_LOG_LEVEL", "loud"),
         ("RIDETUNE_LIMIT_SESSIONS", "many"),
         ("RIDETUNE_LIMIT_SESSIONS", "-1"),
         ("RIDETUNE_LIMIT_SESSIONS", "2.5"),
