@@ -12,6 +12,7 @@ import os
 import threading
 import time
 import warnings
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -86,6 +87,15 @@ class Cluster:
         self._local: Any = None
         self._leave: threading.Timer | None = None
         self._closed = False
+        self.became: Counter[str] = Counter()
+        """How many tasks were submitted, and how many were done, failed, cancelled or lost."""
+
+    def workers(self) -> int:
+        """How many there are now; 0 while none are needed."""
+        client = self._client
+        if client is None:
+            return 0
+        return len(client.sync(client.scheduler.ncores, callback_timeout=1))
 
     def width(self) -> int:
         """How many tasks run at a time; Unavailable where the workers cannot be reached."""
@@ -115,6 +125,7 @@ class Cluster:
                 return
             client = self._started()
             self._submissions += 1
+            self.became["submitted"] += 1
             known = self._tasks[name] = _Task(listener)
             with warnings.catch_warnings():
                 # Recordings travel with their task so that a lost worker costs nothing but time.
@@ -261,6 +272,7 @@ class Cluster:
                 return
             del self._tasks[name]
             self._leave_later()
+        self.became["lost" if ending is None else ending["state"]] += 1
         if ending is None:
             task.listener.task_lost(name, with_worker=not lost)
         else:

@@ -41,6 +41,8 @@ class Database(ABC):
         self._reader = reader
         self._writer = writer
         self._troubled = False
+        self.errors = 0
+        """How many transactions have failed by the database."""
         try:
             with self.writing() as connection:
                 self.lock(connection, {"schema"})
@@ -95,6 +97,7 @@ class Database(ABC):
                 "Too many requests wait for the database; try again shortly.", retry_after=5
             ) from None
         except DBAPIError as error:
+            self.errors += 1
             if (trouble := self.trouble(error)) is None:
                 raise
             if isinstance(trouble, Unavailable) and not self._troubled:

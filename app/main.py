@@ -6,6 +6,7 @@ import logging
 import os
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from functools import partial
 from importlib.metadata import version
 from importlib.util import find_spec
 
@@ -21,6 +22,7 @@ from . import (
     routes_identifications,
     routes_mappings,
     routes_measurements,
+    routes_metrics,
     routes_page,
     routes_profiles,
     routes_sessions,
@@ -33,9 +35,11 @@ from .campaign_job import campaign
 from .cluster import Cluster
 from .draining import Drain, Draining
 from .guard import Guard
+from .heartbeat import beat
 from .identification_job import KIND as IDENTIFICATION
 from .identification_job import identify_runs, of_recordings
 from .jobs import Jobs
+from .metrics import Metrics
 from .observed import Observed
 from .package_files import package_folder
 from .pool import Pool
@@ -45,6 +49,7 @@ from .profile_job import profile_parameter
 from .readiness import Readiness
 from .recordings import Recordings
 from .services import Services, Viewers
+from .services_metrics import ServicesCollector
 from .settings import Limits, Settings
 from .store import Store
 from .sweep_job import KIND as SWEEP
@@ -66,20 +71,27 @@ def create_app(
 ) -> FastAPI:
     """The service; its data directory is locked from here or from start-up until it stops."""
 
-    draining = Draining()
+    draining, metrics = Draining(), Metrics()
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        services = _services(settings, store, warm_up, draining)
+        services = _services(settings, store, warm_up, draining, metrics)
         app.state.services = services
         services.warmup.start()
         services.jobs.start(asyncio.get_running_loop())
-        reaper = asyncio.create_task(_reap(services.viewers))
+        collector = ServicesCollector(services)
+        metrics.registry.register(collector)
+        own = [
+            asyncio.create_task(_reap(services.viewers)),
+            asyncio.create_task(beat(metrics.lag.observe)),
+        ]
         try:
             yield
         finally:
-            reaper.cancel()
-            await asyncio.gather(reaper, return_exceptions=True)
+            for task in own:
+                task.cancel()
+            await asyncio.gather(*own, return_exceptions=True)
+            metrics.registry.unregister(collector)
             await asyncio.to_thread(_close, services)
 
     app = FastAPI(
@@ -108,6 +120,7 @@ def create_app(
         routes_campaigns,
         routes_page,
         routes_health,
+        routes_metrics,
     ):
         app.include_router(part.router)
     if find_spec(".viewer", __package__):
@@ -120,7 +133,7 @@ def create_app(
     app.add_middleware(Unexpected)
     app.add_middleware(Drain, draining=draining)
     app.add_middleware(Guard, settings=settings)
-    app.add_middleware(Observed)
+    app.add_middleware(Observed, metrics=metrics)
     app.state.draining = draining
     return app
 
@@ -130,19 +143,22 @@ def _services(
     store: Store | None,
     warm_up: Callable[[WarmUp], object],
     draining: Draining,
+    metrics: Metrics,
 ) -> Services:
     store = store or Store(settings.data, settings.limits, settings.database)
+    cluster = Cluster(settings.cluster, store.directory.scratch)
     recordings = Recordings(store)
     warmup = WarmUp(warm_up)
     return Services(
         settings=settings,
         store=store,
         recordings=recordings,
-        interactive=interactive(settings.limits),
-        readers=readers(settings.limits),
+        interactive=interactive(settings.limits, partial(metrics.worked, "interactive")),
+        readers=readers(settings.limits, partial(metrics.worked, "readers")),
+        cluster=cluster,
         jobs=Jobs(
             store,
-            Cluster(settings.cluster, store.directory.scratch),
+            cluster,
             {
                 CAMPAIGN: campaign(),
                 IDENTIFICATION: of_recordings(identify_runs, store, recordings),
@@ -157,11 +173,12 @@ def _services(
         readiness=Readiness(
             draining, warmup, store.database, store.directory.path, settings.cluster
         ),
+        metrics=metrics,
         viewers=_viewers(),
     )
 
 
-def interactive(limits: Limits) -> Pool:
+def interactive(limits: Limits, worked: Callable[[float, float], None]) -> Pool:
     """As wide as the cores: a wider one would not compute faster, it would only take the event
     loop's share of Python's lock.
     """
@@ -172,10 +189,11 @@ def interactive(limits: Limits) -> Pool:
         share=share,
         most=limits.waiting_simulations,
         at_once=share,
+        worked=worked,
     )
 
 
-def readers(limits: Limits) -> Pool:
+def readers(limits: Limits, worked: Callable[[float, float], None]) -> Pool:
     """One file of a session at a time, so that one that sends many keeps nobody else waiting."""
     return Pool(
         "files to read",
@@ -184,6 +202,7 @@ def readers(limits: Limits) -> Pool:
         most=limits.waiting_readings,
         at_once=1,
         retry_after=5,
+        worked=worked,
     )
 
 

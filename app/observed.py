@@ -15,6 +15,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from . import logs
+from .metrics import Metrics
 from .route_template import route_of
 
 access = logging.getLogger("ridetune.access")
@@ -29,8 +30,10 @@ CLOSED_BY_CALLER = 499
 class Observed:
     """ASGI middleware around all others."""
 
-    def __init__(self, app: ASGIApp, clock: Callable[[], float] = time.perf_counter):
-        self.app, self.clock = app, clock
+    def __init__(
+        self, app: ASGIApp, metrics: Metrics, clock: Callable[[], float] = time.perf_counter
+    ):
+        self.app, self.metrics, self.clock = app, metrics, clock
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on under its id."""
@@ -48,7 +51,13 @@ class Observed:
 
     async def _http(self, scope: Scope, receive: Receive, send: Send, request: str) -> None:
         began = self.clock()
-        status, sent = CLOSED_BY_CALLER, 0
+        status, received, sent = CLOSED_BY_CALLER, 0, 0
+
+        async def heard() -> Message:
+            nonlocal received
+            message = await receive()
+            received += len(message.get("body", b""))
+            return message
 
         async def told(message: Message) -> None:
             nonlocal status, sent
@@ -60,10 +69,12 @@ class Observed:
             await send(message)
 
         try:
-            await self.app(scope, receive, told)
+            await self.app(scope, heard, told)
         finally:
             method = scope["method"] if scope["method"] in METHODS else "other"
-            _tell(method, route_of(scope), status, self.clock() - began, sent)
+            route, seconds = route_of(scope), self.clock() - began
+            self.metrics.requested(method, route, status, seconds, received, sent)
+            _tell(method, route, status, seconds, sent)
 
     async def _websocket(self, scope: Scope, receive: Receive, send: Send) -> None:
         began = self.clock()
@@ -83,9 +94,12 @@ class Observed:
                 code = message.get("code", 1005)
             return message
 
+        self.metrics.websockets.inc()
         try:
             await self.app(scope, heard, told)
         finally:
+            self.metrics.websockets.dec()
+            self.metrics.hung_up(code)
             _tell("WEBSOCKET", route_of(scope), code, self.clock() - began, sent)
 
 

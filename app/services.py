@@ -7,8 +7,10 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 from ..engine.vehicle import Vehicle
+from .cluster import Cluster
 from .draining import Draining
 from .jobs import Jobs
+from .metrics import Metrics
 from .pool import Pool
 from .readiness import Readiness
 from .recordings import Recordings
@@ -29,6 +31,10 @@ class Viewers(Protocol):
     def reap(self) -> None:
         """End the scenes nobody has watched for a while."""
 
+    def count(self) -> int:
+        """How many scenes there are."""
+        ...
+
     def close(self) -> None:
         """End all scenes."""
 
@@ -46,10 +52,12 @@ class Services:
     recordings: Recordings
     interactive: Pool
     readers: Pool
+    cluster: Cluster
     jobs: Jobs
     warmup: WarmUp
     draining: Draining
     readiness: Readiness
+    metrics: Metrics
     viewers: Viewers | None = None
 
 

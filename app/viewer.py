@@ -116,6 +116,10 @@ class Viewers:
         for sid in idle:
             self.stop(sid)
 
+    def count(self) -> int:
+        """How many there are, watched or not."""
+        return len(self._viewers)
+
     def close(self) -> None:
         """Stop every viewer."""
         for sid in list(self._viewers):
