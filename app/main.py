@@ -30,6 +30,7 @@ from . import (
     routes_sweeps,
     routes_validations,
 )
+from .callers import Callers
 from .campaign_job import KIND as CAMPAIGN
 from .campaign_job import campaign
 from .cluster import Cluster
@@ -174,7 +175,8 @@ def _services(
             draining, warmup, store.database, store.directory.path, settings.cluster
         ),
         metrics=metrics,
-        viewers=_viewers(),
+        callers=Callers(settings.limits),
+        viewers=_viewers(settings.limits),
     )
 
 
@@ -206,12 +208,12 @@ def readers(limits: Limits, worked: Callable[[float, float], None]) -> Pool:
     )
 
 
-def _viewers() -> Viewers | None:
+def _viewers(limits: Limits) -> Viewers | None:
     if not find_spec(".viewer", __package__):
         return None
     from .viewer import Viewers as Scenes
 
-    return Scenes()
+    return Scenes(limits)
 
 
 def _close(services: Services) -> None:

@@ -26,7 +26,13 @@ from .storage import trouble_of
 log = logging.getLogger(__name__)
 
 MEDIA_TYPE = "application/problem+json"
-CODES = {400: "bad-request", 404: "not-found", 405: "method-not-allowed", 413: "too-large"}
+CODES = {
+    400: "bad-request",
+    404: "not-found",
+    405: "method-not-allowed",
+    408: "too-slow",
+    413: "too-large",
+}
 
 
 def problem(

@@ -8,6 +8,7 @@ from pathlib import Path
 import uvicorn
 
 from . import logs
+from .connection import connections
 from .errors import StartError
 from .main import create_app
 from .server import CUT_OFF_SECONDS, Server
@@ -31,8 +32,12 @@ def serve(settings: Settings) -> None:
         invitation = "?token=<RIDETUNE_TOKEN>" if settings.token else ""
         print(f"ridetune serves http://{shown}:{port}/{invitation} (data in {settings.data})")
         app = create_app(settings, store=store)
+        http, websocket = connections(settings.limits)
         config = uvicorn.Config(
             app,
+            http=http,
+            ws=websocket,
+            ws_max_size=settings.limits.viewer_message_bytes,
             log_config=None,
             log_level="warning",
             access_log=False,

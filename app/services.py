@@ -7,6 +7,7 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 from ..engine.vehicle import Vehicle
+from .callers import Callers
 from .cluster import Cluster
 from .draining import Draining
 from .jobs import Jobs
@@ -58,6 +59,7 @@ class Services:
     draining: Draining
     readiness: Readiness
     metrics: Metrics
+    callers: Callers
     viewers: Viewers | None = None
 
 

@@ -29,17 +29,28 @@ Choice = TypeVar("Choice", bound=str)
 class Limits:
     """What one request, one session or the whole service may ask for."""
 
+    connections: int = 2000
+    head_seconds: float = 10.0
+    stalled_seconds: float = 60.0
     upload_bytes: int = 100_000_000
     body_bytes: int = 4_000_000
+    body_seconds: float = 20.0
+    body_rate: int = 10_000
     reader_bytes: int = 2 << 30
     reader_seconds: int = 20
     sessions: int = 1000
+    new_sessions: int = 60
     session_measurements: int = 50
     session_bytes: int = 500_000_000
     session_jobs: int = 200
     unfinished_jobs: int = 4
     session_simulations: int = 4
     waiting_simulations: int = 64
+    session_simulated_seconds: float = 200_000.0
+    viewers: int = 200
+    session_viewers: int = 8
+    viewer_messages: int = 200
+    viewer_message_bytes: int = 256_000
     readers: int = 2
     session_readings: int = 16
     waiting_readings: int = 64
