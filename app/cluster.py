@@ -20,6 +20,7 @@ from typing import Any, Protocol
 
 from . import logs, worker
 from .errors import Unavailable
+from .settings import Certificates
 
 log = logging.getLogger(__name__)
 
@@ -73,9 +74,16 @@ class Cluster:
     """Processes that run tasks."""
 
     def __init__(
-        self, address: str, scratch: Path, *, workers: int | None = None, idle_seconds: float = 120
+        self,
+        address: str,
+        scratch: Path,
+        *,
+        certificates: Certificates | None = None,
+        workers: int | None = None,
+        idle_seconds: float = 120,
     ):
         self._address = address
+        self._certificates = certificates
         self._scratch = scratch
         self._workers = workers or os.cpu_count() or 1
         self._idle_seconds = idle_seconds
@@ -216,7 +224,13 @@ class Cluster:
         logging.getLogger("distributed").setLevel(logging.ERROR)
         logs.adopt("distributed")
         if self._address:
-            return Client(self._address, set_as_default=False, name="ridetune", timeout=LOOK_EVERY)
+            return Client(
+                self._address,
+                security=_security(self._certificates),
+                set_as_default=False,
+                name="ridetune",
+                timeout=LOOK_EVERY,
+            )
         no_dashboard: Any = None
         self._local = LocalCluster(
             n_workers=self._workers,
@@ -306,6 +320,20 @@ def _run(client: Any, function: Any, *values: Any, **where: Any) -> None:
         client.run(function, *values, on_error="ignore", **where)
     except (OSError, RuntimeError) as error:
         log.warning("cannot reach the job workers: %s", error)
+
+
+def _security(certificates: Certificates | None) -> Any:
+    """What Dask calls the files, and that it must do nothing without them."""
+    from distributed import Security
+
+    if certificates is None:
+        return None
+    return Security(
+        tls_ca_file=str(certificates.ca),
+        tls_client_cert=str(certificates.certificate),
+        tls_client_key=str(certificates.key),
+        require_encryption=True,
+    )
 
 
 def _ending_of(task: _Task, future: Any) -> worker.Ending | None:

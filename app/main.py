@@ -147,7 +147,7 @@ def _services(
     metrics: Metrics,
 ) -> Services:
     store = store or Store(settings.data, settings.limits, settings.database)
-    cluster = Cluster(settings.cluster, store.directory.scratch)
+    cluster = Cluster(settings.cluster, store.directory.scratch, certificates=settings.certificates)
     recordings = Recordings(store)
     warmup = WarmUp(warm_up)
     return Services(

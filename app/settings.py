@@ -1,7 +1,8 @@
 """What the service is told from outside: where its data lives, where it listens, how much it takes.
 
 Every setting has an environment variable: RIDETUNE_DATA, RIDETUNE_HOST, RIDETUNE_PORT,
-RIDETUNE_TOKEN, RIDETUNE_ALLOWED_HOSTS (comma separated), RIDETUNE_CLUSTER, RIDETUNE_DATABASE,
+RIDETUNE_TOKEN, RIDETUNE_ALLOWED_HOSTS (comma separated), RIDETUNE_CLUSTER with
+RIDETUNE_CLUSTER_CA, RIDETUNE_CLUSTER_CERT and RIDETUNE_CLUSTER_KEY, RIDETUNE_DATABASE,
 RIDETUNE_GRACE, RIDETUNE_NOTICE, RIDETUNE_LOG, RIDETUNE_LOG_LEVEL, and for each limit
 RIDETUNE_LIMIT_ followed by its name in capitals.
 """
@@ -65,11 +66,24 @@ class Limits:
     long_driven_seconds: float = 200.0
 
 
+@dataclass(frozen=True)
+class Certificates:
+    """PEM files by which both ends of a connection to a scheduler know each other.
+
+    ca : the authority's certificate;  certificate, key : this end's own
+    """
+
+    ca: Path
+    certificate: Path
+    key: Path
+
+
 @dataclass(frozen=True, kw_only=True)
 class Settings:
     """One service.
 
     cluster : empty for workers of its own, else a Dask scheduler's address
+    certificates : what a scheduler at tls:// asks for
     database : empty for SQLite in the data directory, else a PostgreSQL URL
     grace : how long requests under way may take when the service is told to end, s
     notice : how long it says that it ends before it does, s
@@ -82,6 +96,7 @@ class Settings:
     token: str = ""
     allowed_hosts: tuple[str, ...] = ()
     cluster: str = ""
+    certificates: Certificates | None = None
     database: str = field(default="", repr=False)
     grace: float = 10.0
     notice: float = 0.0
@@ -100,13 +115,15 @@ class Settings:
     ) -> "Settings":
         """Settings from the environment; an argument that is not None goes before it."""
         allowed = environment.get("RIDETUNE_ALLOWED_HOSTS", "")
+        cluster = environment.get("RIDETUNE_CLUSTER", "")
         return cls(
             data=Path(data or environment.get("RIDETUNE_DATA") or _default_data(environment)),
             host=host or environment.get("RIDETUNE_HOST") or cls.host,
             port=_port(environment.get("RIDETUNE_PORT", cls.port) if port is None else port),
             token=environment.get("RIDETUNE_TOKEN", ""),
             allowed_hosts=tuple(name.strip() for name in allowed.split(",") if name.strip()),
-            cluster=environment.get("RIDETUNE_CLUSTER", ""),
+            cluster=cluster,
+            certificates=_certificates(cluster, environment),
             database=environment.get("RIDETUNE_DATABASE", ""),
             grace=_seconds("RIDETUNE_GRACE", environment, cls.grace),
             notice=_seconds("RIDETUNE_NOTICE", environment, cls.notice),
@@ -153,6 +170,23 @@ def _port(value: int | str) -> int:
     if not 0 <= port <= 65535:
         raise StartError(f"The port {value!r} is not a number from 0 to 65535; give another one.")
     return port
+
+
+def _certificates(cluster: str, environment: Mapping[str, str]) -> Certificates | None:
+    """The three files, which go with a scheduler at tls:// and with no other."""
+    variables = [f"RIDETUNE_CLUSTER_{part}" for part in ("CA", "CERT", "KEY")]
+    stated = [environment.get(variable, "") for variable in variables]
+    encrypted = cluster.startswith("tls://")
+    for variable, path in zip(variables, stated, strict=True):
+        if encrypted and not os.access(path, os.R_OK):
+            what = f"{path} cannot be read" if path else "is not set"
+            raise StartError(
+                f"{variable} {what}; {cluster} needs a readable PEM file in each of "
+                f"{', '.join(variables)}."
+            )
+        if path and not encrypted:
+            raise StartError(f"{variable} is of use only with a RIDETUNE_CLUSTER at tls://.")
+    return Certificates(*map(Path, stated)) if encrypted else None
 
 
 def _one_of(
