@@ -96,6 +96,8 @@ def make_certificates(folder: Path) -> Certificates:
     authority = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "authority")])
     now = datetime.now(UTC)
 
+    issuer = x509.AuthorityKeyIdentifier.from_issuer_public_key(authority_key.public_key())
+
     def signed(name: x509.Name, public, *extensions: x509.ExtensionType) -> bytes:
         builder = (
             x509.CertificateBuilder()
@@ -108,6 +110,8 @@ def make_certificates(folder: Path) -> Certificates:
         )
         for extension in extensions:
             builder = builder.add_extension(extension, critical=True)
+        for identifier in (x509.SubjectKeyIdentifier.from_public_key(public), issuer):
+            builder = builder.add_extension(identifier, critical=False)
         return builder.sign(authority_key, hashes.SHA256()).public_bytes(serialization.Encoding.PEM)
 
     own = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "cluster")])
