@@ -149,6 +149,49 @@ def test_a_second_signal_ends_it_at_once(tmp_path):
         assert service.process.wait(PATIENCE) == 128 + signal.SIGTERM
 
 
+def test_a_request_that_outlasts_its_grace_is_told_so():
+    """The server then cancels what is under way."""
+
+    async def never(scope, receive, send):
+        await asyncio.Event().wait()
+
+    async def run():
+        draining, sent = Draining(), []
+
+        async def send(message):
+            sent.append(message)
+
+        request = asyncio.create_task(Drain(never, draining)(HTTP, None, send))
+        await asyncio.sleep(0)
+        draining.begin()
+        request.cancel()
+        await request
+        return sent
+
+    start, body = in_a_loop(run)
+    assert start["status"] == 503
+    assert json.loads(body["body"])["code"] == "draining"
+
+
+def test_the_service_manager_hears_how_it_goes(tmp_path, monkeypatch):
+    """Ready once it listens, alive while the event loop beats, stopping once it is told to end."""
+    address = tmp_path / "notify"
+    monkeypatch.setenv("NOTIFY_SOCKET", str(address))
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.bind(str(address))
+        manager.settimeout(PATIENCE)
+        with LiveService(tmp_path / "data") as service:
+            heard = [manager.recv(100)]
+            while heard[-1] != b"WATCHDOG=1":
+                heard.append(manager.recv(100))
+            service.process.send_signal(signal.SIGTERM)
+            while heard[-1] != b"STOPPING=1":
+                heard.append(manager.recv(100))
+            assert service.process.wait(PATIENCE) == 0
+    assert b"READY=1" in heard
+    assert heard[-1] == b"STOPPING=1"
+
+
 @pytest.mark.parametrize("abstract", [False, True])
 def test_the_service_manager_is_told(tmp_path, monkeypatch, abstract):
     """sd_notify(3): a datagram to the socket of NOTIFY_SOCKET; @ stands for a leading NUL."""
