@@ -10,6 +10,7 @@ from typing import Annotated
 from fastapi import Depends, Request, Response
 from starlette.requests import HTTPConnection
 
+from .callers import caller_of
 from .errors import Forbidden, NotFound
 from .samples import sample_project
 from .services import services_of
@@ -54,6 +55,7 @@ def require_service_token(connection: HTTPConnection, token: str) -> None:
 
 def give_session(connection: HTTPConnection, response: Response) -> tuple[str, str]:
     """Id and token of a fresh session, its cookie set on the response."""
+    services_of(connection).callers.open_session(caller_of(connection))
     project = sample_project()
     sid, token = services_of(connection).store.sessions.create(
         project.vehicle, project.measurements

@@ -12,13 +12,15 @@ import os
 import threading
 import time
 import warnings
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from . import worker
+from . import logs, worker
 from .errors import Unavailable
+from .settings import Certificates
 
 log = logging.getLogger(__name__)
 
@@ -72,9 +74,16 @@ class Cluster:
     """Processes that run tasks."""
 
     def __init__(
-        self, address: str, scratch: Path, *, workers: int | None = None, idle_seconds: float = 120
+        self,
+        address: str,
+        scratch: Path,
+        *,
+        certificates: Certificates | None = None,
+        workers: int | None = None,
+        idle_seconds: float = 120,
     ):
         self._address = address
+        self._certificates = certificates
         self._scratch = scratch
         self._workers = workers or os.cpu_count() or 1
         self._idle_seconds = idle_seconds
@@ -86,6 +95,15 @@ class Cluster:
         self._local: Any = None
         self._leave: threading.Timer | None = None
         self._closed = False
+        self.became: Counter[str] = Counter()
+        """How many tasks were submitted, and how many were done, failed, cancelled or lost."""
+
+    def workers(self) -> int:
+        """How many there are now; 0 while none are needed."""
+        client = self._client
+        if client is None:
+            return 0
+        return len(client.sync(client.scheduler.ncores, callback_timeout=1))
 
     def width(self) -> int:
         """How many tasks run at a time; Unavailable where the workers cannot be reached."""
@@ -115,6 +133,7 @@ class Cluster:
                 return
             client = self._started()
             self._submissions += 1
+            self.became["submitted"] += 1
             known = self._tasks[name] = _Task(listener)
             with warnings.catch_warnings():
                 # Recordings travel with their task so that a lost worker costs nothing but time.
@@ -203,8 +222,15 @@ class Cluster:
 
         config.set(CONFIGURATION)
         logging.getLogger("distributed").setLevel(logging.ERROR)
+        logs.adopt("distributed")
         if self._address:
-            return Client(self._address, set_as_default=False, name="ridetune", timeout=LOOK_EVERY)
+            return Client(
+                self._address,
+                security=_security(self._certificates),
+                set_as_default=False,
+                name="ridetune",
+                timeout=LOOK_EVERY,
+            )
         no_dashboard: Any = None
         self._local = LocalCluster(
             n_workers=self._workers,
@@ -253,12 +279,14 @@ class Cluster:
         if task is None or task.future is not future:
             return
         lost = future.status not in ("finished", "error") and not task.cancelled
-        ending = _ending_of(task, future)
+        with logs.about(**worker.about(name)):
+            ending = _ending_of(task, future)
         with self._lock:
             if self._closed or self._tasks.get(name) is not task:
                 return
             del self._tasks[name]
             self._leave_later()
+        self.became["lost" if ending is None else ending["state"]] += 1
         if ending is None:
             task.listener.task_lost(name, with_worker=not lost)
         else:
@@ -292,6 +320,20 @@ def _run(client: Any, function: Any, *values: Any, **where: Any) -> None:
         client.run(function, *values, on_error="ignore", **where)
     except (OSError, RuntimeError) as error:
         log.warning("cannot reach the job workers: %s", error)
+
+
+def _security(certificates: Certificates | None) -> Any:
+    """What Dask calls the files, and that it must do nothing without them."""
+    from distributed import Security
+
+    if certificates is None:
+        return None
+    return Security(
+        tls_ca_file=str(certificates.ca),
+        tls_client_cert=str(certificates.certificate),
+        tls_client_key=str(certificates.key),
+        require_encryption=True,
+    )
 
 
 def _ending_of(task: _Task, future: Any) -> worker.Ending | None:

@@ -42,6 +42,8 @@ class Database(ABC):
         self._reader = reader
         self._writer = writer
         self._troubled = False
+        self.errors = 0
+        """How many transactions have failed by the database."""
         try:
             with self.reading() if made else self.writing() as connection:
                 if not made:
@@ -101,6 +103,7 @@ class Database(ABC):
                 "Too many requests wait for the database; try again shortly.", retry_after=5
             ) from None
         except DBAPIError as error:
+            self.errors += 1
             if (trouble := self.trouble(error)) is None:
                 raise
             if isinstance(trouble, Unavailable) and not self._troubled:

@@ -2,16 +2,18 @@
 
 Host must be on the list, or a page elsewhere could reach a local service by a name of its own
 (DNS rebinding). A request that changes something, and every websocket, must come from our own
-page or from no page at all. Bodies are counted while they arrive.
+page or from no page at all. Bodies are counted, and timed, while they arrive.
 """
 
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from .bodies import Body
 from .problems import problem
 from .settings import Settings
 
@@ -68,10 +70,13 @@ class Guard:
             "a measurement in several files, a set-up part by part."
         )
         if _announced(scope) > limit:
-            await _drain(receive, DRAINED_BODIES * limit)
+            thrown_away = Body(receive, DRAINED_BODIES * limit, too_large, self.limits)
+            with suppress(HTTPException):
+                while (await thrown_away.receive()).get("more_body", False):
+                    pass
             await problem(413, "too-large", too_large)(scope, receive, send)
             return
-        await self.app(scope, _counted(receive, limit, too_large), send)
+        await self.app(scope, Body(receive, limit, too_large, self.limits).receive, send)
 
     def _body_limit(self, scope: Scope) -> int:
         if scope["method"] == "POST" and scope["path"].endswith("/measurements"):
@@ -107,29 +112,6 @@ def _without_port(host: str) -> str:
 def _announced(scope: Scope) -> int:
     length = Headers(scope=scope).get("content-length", "")
     return int(length) if length.isdecimal() and len(length) < 20 else 0
-
-
-async def _drain(receive: Receive, limit: int) -> None:
-    taken = 0
-    while taken <= limit:
-        message = await receive()
-        taken += len(message.get("body", b""))
-        if message["type"] != "http.request" or not message.get("more_body", False):
-            return
-
-
-def _counted(receive: Receive, limit: int, too_large: str) -> Receive:
-    taken = 0
-
-    async def counted() -> Message:
-        nonlocal taken
-        message = await receive()
-        taken += len(message.get("body", b""))
-        if taken > limit:
-            raise HTTPException(413, too_large)
-        return message
-
-    return counted
 
 
 def _with_headers(send: Send) -> Callable[[Message], Awaitable[None]]:

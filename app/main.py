@@ -6,6 +6,7 @@ import logging
 import os
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from functools import partial
 from importlib.metadata import version
 from importlib.util import find_spec
 
@@ -17,9 +18,11 @@ from . import (
     routes_campaigns,
     routes_catalogue,
     routes_conditioning,
+    routes_health,
     routes_identifications,
     routes_mappings,
     routes_measurements,
+    routes_metrics,
     routes_page,
     routes_profiles,
     routes_sessions,
@@ -27,20 +30,27 @@ from . import (
     routes_sweeps,
     routes_validations,
 )
+from .callers import Callers
 from .campaign_job import KIND as CAMPAIGN
 from .campaign_job import campaign
 from .cluster import Cluster
+from .draining import Drain, Draining
 from .guard import Guard
+from .heartbeat import beat
 from .identification_job import KIND as IDENTIFICATION
 from .identification_job import identify_runs, of_recordings
 from .jobs import Jobs
+from .metrics import Metrics
+from .observed import Observed
 from .package_files import package_folder
 from .pool import Pool
-from .problems import reply_to_errors
+from .problems import Unexpected, reply_to_errors
 from .profile_job import KIND as PROFILE
 from .profile_job import profile_parameter
+from .readiness import Readiness
 from .recordings import Recordings
 from .services import Services, Viewers
+from .services_metrics import ServicesCollector
 from .settings import Limits, Settings
 from .store import Store
 from .sweep_job import KIND as SWEEP
@@ -62,18 +72,27 @@ def create_app(
 ) -> FastAPI:
     """The service; its data directory is locked from here or from start-up until it stops."""
 
+    draining, metrics = Draining(), Metrics()
+
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        services = _services(settings, store, warm_up)
+        services = _services(settings, store, warm_up, draining, metrics)
         app.state.services = services
         services.warmup.start()
         services.jobs.start(asyncio.get_running_loop())
-        reaper = asyncio.create_task(_reap(services.viewers))
+        collector = ServicesCollector(services)
+        metrics.registry.register(collector)
+        own = [
+            asyncio.create_task(_reap(services.viewers)),
+            asyncio.create_task(beat(metrics.lag.observe)),
+        ]
         try:
             yield
         finally:
-            reaper.cancel()
-            await asyncio.gather(reaper, return_exceptions=True)
+            for task in own:
+                task.cancel()
+            await asyncio.gather(*own, return_exceptions=True)
+            metrics.registry.unregister(collector)
             await asyncio.to_thread(_close, services)
 
     app = FastAPI(
@@ -101,6 +120,8 @@ def create_app(
         routes_advice,
         routes_campaigns,
         routes_page,
+        routes_health,
+        routes_metrics,
     ):
         app.include_router(part.router)
     if find_spec(".viewer", __package__):
@@ -109,25 +130,36 @@ def create_app(
         app.include_router(router)
     app.mount("/static", StaticFiles(directory=package_folder("static")))
     reply_to_errors(app)
+    # The last one is the outermost.
+    app.add_middleware(Unexpected)
+    app.add_middleware(Drain, draining=draining)
     app.add_middleware(Guard, settings=settings)
+    app.add_middleware(Observed, metrics=metrics)
+    app.state.draining = draining
     return app
 
 
 def _services(
-    settings: Settings, store: Store | None, warm_up: Callable[[WarmUp], object]
+    settings: Settings,
+    store: Store | None,
+    warm_up: Callable[[WarmUp], object],
+    draining: Draining,
+    metrics: Metrics,
 ) -> Services:
     store = store or Store(settings.data, settings.limits, settings.database)
+    cluster = Cluster(settings.cluster, store.directory.scratch, certificates=settings.certificates)
     recordings = Recordings(store)
     warmup = WarmUp(warm_up)
     return Services(
         settings=settings,
         store=store,
         recordings=recordings,
-        interactive=interactive(settings.limits),
-        readers=readers(settings.limits),
+        interactive=interactive(settings.limits, partial(metrics.worked, "interactive")),
+        readers=readers(settings.limits, partial(metrics.worked, "readers")),
+        cluster=cluster,
         jobs=Jobs(
             store,
-            Cluster(settings.cluster, store.directory.scratch),
+            cluster,
             {
                 CAMPAIGN: campaign(),
                 IDENTIFICATION: of_recordings(identify_runs, store, recordings),
@@ -135,14 +167,20 @@ def _services(
                 SWEEP: sweep(store, recordings),
                 VALIDATION: validation(store, recordings),
             },
-            ready=warmup.wait,
+            ready=lambda: warmup.wait() and not draining.begun,
         ),
         warmup=warmup,
-        viewers=_viewers(),
+        draining=draining,
+        readiness=Readiness(
+            draining, warmup, store.database, store.directory.path, settings.cluster
+        ),
+        metrics=metrics,
+        callers=Callers(settings.limits),
+        viewers=_viewers(settings.limits),
     )
 
 
-def interactive(limits: Limits) -> Pool:
+def interactive(limits: Limits, worked: Callable[[float, float], None]) -> Pool:
     """As wide as the cores: a wider one would not compute faster, it would only take the event
     loop's share of Python's lock.
     """
@@ -153,10 +191,11 @@ def interactive(limits: Limits) -> Pool:
         share=share,
         most=limits.waiting_simulations,
         at_once=share,
+        worked=worked,
     )
 
 
-def readers(limits: Limits) -> Pool:
+def readers(limits: Limits, worked: Callable[[float, float], None]) -> Pool:
     """One file of a session at a time, so that one that sends many keeps nobody else waiting."""
     return Pool(
         "files to read",
@@ -165,25 +204,29 @@ def readers(limits: Limits) -> Pool:
         most=limits.waiting_readings,
         at_once=1,
         retry_after=5,
+        worked=worked,
     )
 
 
-def _viewers() -> Viewers | None:
+def _viewers(limits: Limits) -> Viewers | None:
     if not find_spec(".viewer", __package__):
         return None
     from .viewer import Viewers as Scenes
 
-    return Scenes()
+    return Scenes(limits)
 
 
 def _close(services: Services) -> None:
-    services.warmup.close()
-    services.interactive.close()
-    services.readers.close()
-    services.jobs.close()
-    if services.viewers is not None:
-        services.viewers.close()
-    services.store.close()
+    """End the parts, those first that others serve; one that fails leaves none of them open."""
+    with contextlib.ExitStack() as last_first:
+        last_first.callback(services.store.close)
+        if services.viewers is not None:
+            last_first.callback(services.viewers.close)
+        # Jobs are handed back once no request adds one any more.
+        last_first.callback(services.jobs.close)
+        last_first.callback(services.readers.close)
+        last_first.callback(services.interactive.close)
+        last_first.callback(services.warmup.close)
 
 
 async def _reap(viewers: Viewers | None) -> None:

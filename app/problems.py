@@ -1,8 +1,10 @@
 """Errors as the web sees them: RFC 9457 problem details, one sentence each, no echo of the input.
 
-An unknown exception stays a loud 500: logged with its traceback, answered without it.
+An unknown exception stays a loud 500: logged with its traceback, answered without it. A failure of
+ours names the request, under which the log has the rest.
 """
 
+import contextlib
 import logging
 from collections.abc import Mapping
 from http import HTTPStatus
@@ -12,15 +14,25 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from ..engine.errors import RideError
+from . import logs
 from .errors import InvalidRequest, ServiceError
+from .route_template import route_of
 from .storage import trouble_of
 
 log = logging.getLogger(__name__)
 
 MEDIA_TYPE = "application/problem+json"
-CODES = {400: "bad-request", 404: "not-found", 405: "method-not-allowed", 413: "too-large"}
+CODES = {
+    400: "bad-request",
+    404: "not-found",
+    405: "method-not-allowed",
+    408: "too-slow",
+    413: "too-large",
+}
 
 
 def problem(
@@ -41,6 +53,8 @@ def problem(
     }
     if field:
         body["field"] = field
+    if status >= 500 and (request := logs.known_about().get("request")):
+        body["request"] = request
     return JSONResponse(body, status, headers=headers, media_type=MEDIA_TYPE)
 
 
@@ -88,10 +102,41 @@ def reply_to_errors(app: FastAPI) -> None:
             detail = "This address does not take that method; see /api/openapi.json."
         return problem(error.status_code, code, detail, headers=error.headers)
 
-    @app.exception_handler(Exception)
-    async def unexpected(request: Request, error: Exception) -> JSONResponse:
-        log.error("unexpected error in %s %s", request.method, request.url.path, exc_info=error)
-        return problem(500, "internal", "The service failed here; its log has the details.")
+
+class Unexpected:
+    """ASGI middleware next to the routes: the last resort of an exception, told in the log only."""
+
+    def __init__(self, app: ASGIApp):
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on, and answer for what goes wrong."""
+        begun = False
+
+        async def noted(message: Message) -> None:
+            nonlocal begun
+            begun = begun or message["type"] == "http.response.start"
+            await send(message)
+
+        try:
+            await self.app(scope, receive, noted)
+        except ClientDisconnect:
+            # Half a request: there is nobody to answer, and nothing of ours went wrong.
+            pass
+        except Exception:
+            if scope["type"] == "lifespan":
+                raise
+            log.exception("unexpected error in %s", route_of(scope))
+            if scope["type"] == "websocket":
+                await _close_failed(send)
+            elif not begun:
+                failed = "The service failed here; its log has the details under this request."
+                await problem(500, "internal", failed)(scope, receive, send)
+
+
+async def _close_failed(send: Send) -> None:
+    with contextlib.suppress(OSError, RuntimeError):
+        await send({"type": "websocket.close", "code": 1011, "reason": "The service failed here."})
 
 
 def _first_complaint(error: RequestValidationError) -> tuple[str, str]:

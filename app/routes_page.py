@@ -1,11 +1,10 @@
-"""The page, the service's health, and the way a browser gets its session."""
+"""The page, and the way a browser gets its session."""
 
 from html import escape
-from typing import Any
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Request
-from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, RedirectResponse, Response
+from fastapi.responses import FileResponse, HTMLResponse, RedirectResponse, Response
 from starlette.concurrency import run_in_threadpool
 
 from .access import give_session, own_session, require_service_token, session_of
@@ -14,20 +13,6 @@ from .package_files import package_folder
 from .services import Shared
 
 router = APIRouter()
-
-
-@router.get("/healthz", tags=["health"])
-async def healthz() -> dict[str, str]:
-    """The service runs."""
-    return {"state": "running"}
-
-
-@router.get("/readyz", tags=["health"])
-async def readyz(services: Shared) -> JSONResponse:
-    """The service simulates: 200 once the kernels are compiled, 503 before."""
-    warmup = services.warmup
-    body: dict[str, Any] = {"state": warmup.state, "message": warmup.message}
-    return JSONResponse(body, 200 if warmup.state == "ready" else 503)
 
 
 @router.get("/", include_in_schema=False)

@@ -50,6 +50,7 @@ def _simulated(
         raise InvalidRequest("Bands come as JSON or frames; ask for one of them.", field="bands")
     store, limits = services.store, services.settings.limits
     task = plan(body, sid, fitted, store, services.recordings, limits)
+    services.callers.simulate(sid, task.seconds)
     found = reply(body, task)
     if body.scene and services.viewers is not None:
         services.viewers.show(sid, task.vehicle)

@@ -1,7 +1,5 @@
 """Run the service until it is told to stop."""
 
-import contextlib
-import logging
 import os
 import resource
 import socket
@@ -9,12 +7,14 @@ from pathlib import Path
 
 import uvicorn
 
+from . import logs
+from .connection import connections
 from .errors import StartError
 from .main import create_app
+from .server import CUT_OFF_SECONDS, Server
 from .settings import Settings
 from .store import Store
 
-GRACE_SECONDS = 3
 FILES = 65_536
 WAITING = 1024
 
@@ -22,7 +22,7 @@ WAITING = 1024
 def serve(settings: Settings) -> None:
     """Serve; StartError with a sentence if the address or the data directory cannot be had."""
     settings.check_bind()
-    logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
+    logs.configure(settings.log, settings.log_level)
     _allow_many_files()
     _find_cache(settings)
     with _listen(settings) as listener:
@@ -31,17 +31,22 @@ def serve(settings: Settings) -> None:
         shown = f"[{host}]" if ":" in host else host
         invitation = "?token=<RIDETUNE_TOKEN>" if settings.token else ""
         print(f"ridetune serves http://{shown}:{port}/{invitation} (data in {settings.data})")
+        app = create_app(settings, store=store)
+        http, websocket = connections(settings.limits)
         config = uvicorn.Config(
-            create_app(settings, store=store),
+            app,
+            http=http,
+            ws=websocket,
+            ws_max_size=settings.limits.viewer_message_bytes,
+            log_config=None,
             log_level="warning",
             access_log=False,
             server_header=False,
             ws_per_message_deflate=False,
-            timeout_graceful_shutdown=GRACE_SECONDS,
+            timeout_graceful_shutdown=CUT_OFF_SECONDS,
         )
-        # Ctrl-C has ended the service in good order when uvicorn passes it on.
-        with contextlib.suppress(KeyboardInterrupt):
-            uvicorn.Server(config).run(sockets=[listener])
+        server = Server(config, app.state.draining, grace=settings.grace, notice=settings.notice)
+        server.run(sockets=[listener])
 
 
 def _listen(settings: Settings) -> socket.socket:

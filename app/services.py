@@ -7,8 +7,13 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 from ..engine.vehicle import Vehicle
+from .callers import Callers
+from .cluster import Cluster
+from .draining import Draining
 from .jobs import Jobs
+from .metrics import Metrics
 from .pool import Pool
+from .readiness import Readiness
 from .recordings import Recordings
 from .settings import Settings
 from .store import Store
@@ -27,6 +32,10 @@ class Viewers(Protocol):
     def reap(self) -> None:
         """End the scenes nobody has watched for a while."""
 
+    def count(self) -> int:
+        """How many scenes there are."""
+        ...
+
     def close(self) -> None:
         """End all scenes."""
 
@@ -44,8 +53,13 @@ class Services:
     recordings: Recordings
     interactive: Pool
     readers: Pool
+    cluster: Cluster
     jobs: Jobs
     warmup: WarmUp
+    draining: Draining
+    readiness: Readiness
+    metrics: Metrics
+    callers: Callers
     viewers: Viewers | None = None
 
 

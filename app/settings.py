@@ -1,8 +1,10 @@
 """What the service is told from outside: where its data lives, where it listens, how much it takes.
 
 Every setting has an environment variable: RIDETUNE_DATA, RIDETUNE_HOST, RIDETUNE_PORT,
-RIDETUNE_TOKEN, RIDETUNE_ALLOWED_HOSTS (comma separated), RIDETUNE_CLUSTER, RIDETUNE_DATABASE, and
-for each limit RIDETUNE_LIMIT_ followed by its name in capitals.
+RIDETUNE_TOKEN, RIDETUNE_ALLOWED_HOSTS (comma separated), RIDETUNE_CLUSTER with
+RIDETUNE_CLUSTER_CA, RIDETUNE_CLUSTER_CERT and RIDETUNE_CLUSTER_KEY, RIDETUNE_DATABASE,
+RIDETUNE_GRACE, RIDETUNE_NOTICE, RIDETUNE_LOG, RIDETUNE_LOG_LEVEL, and for each limit
+RIDETUNE_LIMIT_ followed by its name in capitals.
 """
 
 import dataclasses
@@ -14,28 +16,42 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
+from . import logs
 from .errors import StartError
 
 LIMIT = "RIDETUNE_LIMIT_"
+
+Choice = TypeVar("Choice", bound=str)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
     """What one request, one session or the whole service may ask for."""
 
+    connections: int = 2000
+    head_seconds: float = 10.0
+    stalled_seconds: float = 60.0
     upload_bytes: int = 100_000_000
     body_bytes: int = 4_000_000
+    body_seconds: float = 20.0
+    body_rate: int = 10_000
     reader_bytes: int = 2 << 30
     reader_seconds: int = 20
     sessions: int = 1000
+    new_sessions: int = 60
     session_measurements: int = 50
     session_bytes: int = 500_000_000
     session_jobs: int = 200
     unfinished_jobs: int = 4
     session_simulations: int = 4
     waiting_simulations: int = 64
+    session_simulated_seconds: float = 200_000.0
+    viewers: int = 200
+    session_viewers: int = 8
+    viewer_messages: int = 200
+    viewer_message_bytes: int = 256_000
     readers: int = 2
     session_readings: int = 16
     waiting_readings: int = 64
@@ -50,12 +66,28 @@ class Limits:
     long_driven_seconds: float = 200.0
 
 
+@dataclass(frozen=True)
+class Certificates:
+    """PEM files by which both ends of a connection to a scheduler know each other.
+
+    ca : the authority's certificate;  certificate, key : this end's own
+    """
+
+    ca: Path
+    certificate: Path
+    key: Path
+
+
 @dataclass(frozen=True, kw_only=True)
 class Settings:
     """One service.
 
     cluster : empty for workers of its own, else a Dask scheduler's address
+    certificates : what a scheduler at tls:// asks for
     database : empty for SQLite in the data directory, else a PostgreSQL URL
+    grace : how long requests under way may take when the service is told to end, s
+    notice : how long it says that it ends before it does, s
+    log, log_level : the form of log records, and which of our own are written
     """
 
     data: Path
@@ -64,7 +96,12 @@ class Settings:
     token: str = ""
     allowed_hosts: tuple[str, ...] = ()
     cluster: str = ""
+    certificates: Certificates | None = None
     database: str = field(default="", repr=False)
+    grace: float = 10.0
+    notice: float = 0.0
+    log: logs.Form = "text"
+    log_level: str = "WARNING"
     limits: Limits = field(default_factory=Limits)
 
     @classmethod
@@ -78,14 +115,20 @@ class Settings:
     ) -> "Settings":
         """Settings from the environment; an argument that is not None goes before it."""
         allowed = environment.get("RIDETUNE_ALLOWED_HOSTS", "")
+        cluster = environment.get("RIDETUNE_CLUSTER", "")
         return cls(
             data=Path(data or environment.get("RIDETUNE_DATA") or _default_data(environment)),
             host=host or environment.get("RIDETUNE_HOST") or cls.host,
             port=_port(environment.get("RIDETUNE_PORT", cls.port) if port is None else port),
             token=environment.get("RIDETUNE_TOKEN", ""),
             allowed_hosts=tuple(name.strip() for name in allowed.split(",") if name.strip()),
-            cluster=environment.get("RIDETUNE_CLUSTER", ""),
+            cluster=cluster,
+            certificates=_certificates(cluster, environment),
             database=environment.get("RIDETUNE_DATABASE", ""),
+            grace=_seconds("RIDETUNE_GRACE", environment, cls.grace),
+            notice=_seconds("RIDETUNE_NOTICE", environment, cls.notice),
+            log=_one_of(logs.FORMS, logs.FORM, environment, cls.log),
+            log_level=_one_of(logs.LEVELS, logs.LEVEL, environment, cls.log_level),
             limits=_limits(environment),
         )
 
@@ -127,6 +170,41 @@ def _port(value: int | str) -> int:
     if not 0 <= port <= 65535:
         raise StartError(f"The port {value!r} is not a number from 0 to 65535; give another one.")
     return port
+
+
+def _certificates(cluster: str, environment: Mapping[str, str]) -> Certificates | None:
+    """The three files, which go with a scheduler at tls:// and with no other."""
+    variables = [f"RIDETUNE_CLUSTER_{part}" for part in ("CA", "CERT", "KEY")]
+    stated = [environment.get(variable, "") for variable in variables]
+    encrypted = cluster.startswith("tls://")
+    for variable, path in zip(variables, stated, strict=True):
+        if encrypted and not os.access(path, os.R_OK):
+            what = f"{path} cannot be read" if path else "is not set"
+            raise StartError(
+                f"{variable} {what}; {cluster} needs a readable PEM file in each of "
+                f"{', '.join(variables)}."
+            )
+        if path and not encrypted:
+            raise StartError(f"{variable} is of use only with a RIDETUNE_CLUSTER at tls://.")
+    return Certificates(*map(Path, stated)) if encrypted else None
+
+
+def _one_of(
+    known: tuple[Choice, ...], variable: str, environment: Mapping[str, str], default: Choice
+) -> Choice:
+    stated = environment.get(variable) or default
+    for choice in known:
+        if choice == stated:
+            return choice
+    raise StartError(f"{variable} is {stated!r}; give one of {', '.join(known)}.")
+
+
+def _seconds(variable: str, environment: Mapping[str, str], default: float) -> float:
+    text = environment.get(variable, "")
+    with suppress(ValueError):
+        if 0 <= (seconds := float(text or default)) < math.inf:
+            return seconds
+    raise StartError(f"{variable} is {text!r}; give a number of seconds, 0 or more.")
 
 
 def _limits(environment: Mapping[str, str]) -> Limits:

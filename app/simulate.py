@@ -26,6 +26,9 @@ from .schemas import SimulationRequest
 from .settings import Limits
 from .store import Store
 
+USUAL_STEP = 0.0025
+"""What a simulated second is charged by, s."""
+
 
 @dataclass(frozen=True)
 class Task:
@@ -34,6 +37,8 @@ class Task:
     vehicle: Vehicle
     run: Callable[[], Any]
     bands: Callable[[], Bands] | None
+    seconds: float
+    """Simulated ones of all cars, at the usual step."""
 
 
 @dataclass(frozen=True)
@@ -72,8 +77,9 @@ def plan(
     def run() -> Any:
         return driven().simulate(vehicle, request.model)
 
+    seconds = max(duration, steps * USUAL_STEP)
     if request.bands is None or fitted is None:
-        return Task(vehicle, run, None)
+        return Task(vehicle, run, None, seconds)
     asked, fit = request.bands, fit_from_json(done(fitted))
     cars = asked.cars if asked.method == "sampled" else 2 * len(fit.free)
     if steps * (cars + 1) > limits.banded_steps:
@@ -82,7 +88,12 @@ def plan(
             f"{limits.banded_steps} are taken; shorten it, or draw fewer cars."
         )
     how: dict[str, Any] = {"cars": asked.cars, "seed": asked.seed, "model": request.model}
-    return Task(vehicle, run, lambda: bands(fit, vehicle, driven(), method=asked.method, **how))
+    return Task(
+        vehicle,
+        run,
+        lambda: bands(fit, vehicle, driven(), method=asked.method, **how),
+        seconds * (cars + 1),
+    )
 
 
 def reply(request: SimulationRequest, task: Task) -> Reply:

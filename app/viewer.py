@@ -23,8 +23,10 @@ from websockets.exceptions import ConnectionClosed, WebSocketException
 
 from ..engine.vehicle import Vehicle
 from .access import session_of
-from .errors import NotFound
+from .buckets import Buckets
+from .errors import Busy, NotFound, Unavailable
 from .package_files import package_folder
+from .settings import Limits
 
 FOG = (18, 22, 27)
 GROUND = (120, 124, 130)
@@ -32,6 +34,8 @@ GROUND = (120, 124, 130)
 MESSAGE_BYTES = 64 << 20
 UNWATCHED_SECONDS = 600.0
 """How long a viewer without a tab is kept."""
+BURST_SECONDS = 5
+"""How long a browser may send as fast as it can, in what it may send a second."""
 EYE, TARGET = (3.3, -4.1, 1.45), (0.0, 0.0, 0.5)
 
 router = APIRouter()
@@ -73,31 +77,54 @@ class Viewer:
 class Viewers:
     """The viewers of all sessions; every method may be called from any thread."""
 
-    def __init__(self):
+    def __init__(self, limits: Limits | None = None):
+        self.limits = limits or Limits()
         self._viewers: dict[str, Viewer] = {}
         self._lock = threading.Lock()
 
     def start(self, sid: str) -> Viewer:
-        """The session's viewer, started when there is none."""
+        """The session's viewer, started when there is none, in place of one that nobody watches if
+        there are too many; `Unavailable` where all are watched.
+        """
         with self._lock:
+            replaced = self._unwatched() if sid not in self._viewers else None
             if sid not in self._viewers:
                 self._viewers[sid] = Viewer()
             viewer = self._viewers[sid]
             viewer.seen = time.monotonic()
-            return viewer
+        if replaced is not None:
+            replaced.server.stop()
+        return viewer
+
+    def _unwatched(self) -> Viewer | None:
+        """The viewer that makes room for another, if one must."""
+        if len(self._viewers) < self.limits.viewers:
+            return None
+        unwatched = [sid for sid, viewer in self._viewers.items() if viewer.watchers <= 0]
+        if not unwatched:
+            raise Unavailable("All 3D views are in use; the page tries again by itself.")
+        return self._viewers.pop(min(unwatched, key=lambda sid: self._viewers[sid].seen))
 
     def show(self, sid: str, vehicle: Vehicle) -> None:
         """Put a vehicle on the stage; the browser shapes the road from the histories."""
         from .scene import build
 
-        server = self.start(sid).server
+        try:
+            server = self.start(sid).server
+        except Unavailable:
+            # A tab that wants to see it is told when it connects.
+            return
         with server.atomic():
             build(server, vehicle)
 
     def watch(self, sid: str, tabs: int) -> Viewer:
-        """Count a tab in (+1) or out (-1)."""
+        """Count a tab in (+1) or out (-1); `Busy` where the session has too many."""
         viewer = self.start(sid)
         with self._lock:
+            if viewer.watchers + tabs > self.limits.session_viewers:
+                raise Busy(
+                    f"The session's 3D view is open in {viewer.watchers} tabs; close one of them."
+                )
             viewer.watchers += tabs
         return viewer
 
@@ -115,6 +142,10 @@ class Viewers:
             idle = [sid for sid, v in self._viewers.items() if v.watchers <= 0 and v.seen < late]
         for sid in idle:
             self.stop(sid)
+
+    def count(self) -> int:
+        """How many there are, watched or not."""
+        return len(self._viewers)
 
     def close(self) -> None:
         """Stop every viewer."""
@@ -158,9 +189,15 @@ async def relay(websocket: WebSocket, sid: str) -> None:
     except NotFound:
         await _hang_up(websocket, 1008)
         return
-    viewer = await run_in_threadpool(viewers.watch, sid, 1)
     try:
-        await _pass_on(websocket, viewer.address)
+        viewer = await run_in_threadpool(viewers.watch, sid, 1)
+    except (Busy, Unavailable) as refused:
+        await _hang_up(websocket, 1013, str(refused))
+        return
+    try:
+        await _pass_on(websocket, viewer.address, viewers.limits)
+    except Busy as flooded:
+        await _hang_up(websocket, 1008, str(flooded))
     except (OSError, WebSocketException):
         await _hang_up(websocket, 1013, "The 3D view is restarting.")
     finally:
@@ -174,8 +211,10 @@ async def _hang_up(websocket: WebSocket, code: int, reason: str = "") -> None:
         await websocket.close(code, reason)
 
 
-async def _pass_on(websocket: WebSocket, address: str) -> None:
-    """Carry messages both ways until either side hangs up."""
+async def _pass_on(websocket: WebSocket, address: str, limits: Limits) -> None:
+    """Carry messages both ways until either side hangs up, or the browser sends too many."""
+    rate = limits.viewer_messages
+    messages = Buckets(rate, BURST_SECONDS * rate)
     offered = [p for p in websocket.scope["subprotocols"] if p.startswith("viser-v")][:1]
     async with connect(
         address,
@@ -187,7 +226,7 @@ async def _pass_on(websocket: WebSocket, address: str) -> None:
     ) as upstream:
         await websocket.accept(subprotocol=upstream.subprotocol)
         ways = [
-            asyncio.create_task(_to_viser(websocket, upstream)),
+            asyncio.create_task(_to_viser(websocket, upstream, messages)),
             asyncio.create_task(_to_browser(websocket, upstream)),
         ]
         try:
@@ -195,11 +234,15 @@ async def _pass_on(websocket: WebSocket, address: str) -> None:
         finally:
             for way in ways:
                 way.cancel()
-            await asyncio.gather(*ways, return_exceptions=True)
+            ends = await asyncio.gather(*ways, return_exceptions=True)
+        if isinstance(ends[0], Busy):
+            raise ends[0]
 
 
-async def _to_viser(websocket: WebSocket, upstream: ClientConnection) -> None:
+async def _to_viser(websocket: WebSocket, upstream: ClientConnection, messages: Buckets) -> None:
     while (message := await websocket.receive())["type"] != "websocket.disconnect":
+        if messages.take("browser"):
+            raise Busy("The 3D view sends too many messages; load the page again.")
         data = message.get("bytes")
         await upstream.send(message["text"] if data is None else data)
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, NotRequired, TypedDict
 
 from ..engine.errors import Cancelled, RideError
+from . import logs
 
 TOPIC = "ridetune-tasks"
 LOWEST_PRIORITY = 19
@@ -77,6 +78,7 @@ def run(name: str, task: Task, payload: Any, kept: Mapping[str, bytes]) -> Endin
     """Run a task to its end; unknown exceptions go to the scheduler as they are."""
     from distributed import get_worker
 
+    logs.configure_worker()
     os.setpriority(os.PRIO_PROCESS, 0, LOWEST_PRIORITY)
     worker = get_worker()
     progress: dict[str, Any] = {}
@@ -102,7 +104,9 @@ def run(name: str, task: Task, payload: Any, kept: Mapping[str, bytes]) -> Endin
 
     send(address=worker.address, process=os.getpid())
     try:
-        found = task(payload, Attempt(report, lambda: name in _asked_to_stop, keep, kept))
+        attempt = Attempt(report, lambda: name in _asked_to_stop, keep, kept)
+        with logs.about(**about(name)):
+            found = task(payload, attempt)
         if isinstance(found, WithFile):
             return {**ending("done", result=found.result), "file": found.file}
         return ending("done", result=found)
@@ -114,6 +118,12 @@ def run(name: str, task: Task, payload: Any, kept: Mapping[str, bytes]) -> Endin
         return ending("failed", error={"code": error.code, "detail": str(error)})
     finally:
         _asked_to_stop.discard(name)
+
+
+def about(name: str) -> dict[str, str]:
+    """What log records of a task are about: its job, and the unit of it where there are several."""
+    job, _, unit = name.partition("/")
+    return {"job": job, "unit": unit} if unit else {"job": job}
 
 
 def ask_to_stop(*names: str) -> None:

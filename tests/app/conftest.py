@@ -19,7 +19,10 @@ from ridetune.app.main import create_app
 from ridetune.app.settings import Limits, Settings
 
 from .command_line import SHORT
+from .dask_processes import dask_processes
 from .postgresql_server import PostgresqlServer
+
+__all__ = ["dask_processes"]
 
 ADDRESS = "http://127.0.0.1:8000"
 SAMPLES = Path(__file__).parents[2] / "sample_runs"

@@ -38,6 +38,20 @@ def ignore(payload, attempt):
     return {"value": "never killed"}
 
 
+def note(payload, attempt):
+    """Log a record; what it is as a line, in this process."""
+    import logging
+
+    from ridetune.app.logs import JsonLines
+
+    log = logging.getLogger("ridetune.task")
+    formatter = logging.getLogger().handlers[0].formatter
+    return {
+        "formatter": type(formatter).__name__,
+        "line": JsonLines().format(log.makeRecord(log.name, 30, "", 0, payload, (), None)),
+    }
+
+
 def write(payload, attempt):
     """Make a file."""
     from ridetune.app.worker import WithFile

@@ -1,5 +1,6 @@
 """The seam to Dask: results, progress, cancelling, lost workers. One local cluster for all."""
 
+import json
 import queue
 import time
 
@@ -10,6 +11,7 @@ from ridetune.app.errors import Unavailable
 from ridetune.app.worker import MOST_KEPT, Ending
 
 from . import tasks
+from .dask_processes import make_certificates
 
 PATIENCE = 60.0
 
@@ -74,6 +76,15 @@ def test_a_task_gives_its_result_and_reports_on_the_way(cluster, heard):
     assert heard.started.get(timeout=1) == "double"
     told = [heard.progress.get(timeout=1) for _ in range(2)]
     assert told == [("double", {"cost": 1.0}), ("double", {"cost": 0.5})]
+
+
+def test_a_worker_logs_as_the_service_does_and_names_the_job(cluster, heard):
+    cluster.submit("noted/7", tasks.note, "half way", heard)
+    told = heard.end_of("noted/7")["result"]
+    assert told is not None
+    assert told["formatter"] == "TextLines"
+    line = json.loads(told["line"])
+    assert [line[name] for name in ("job", "unit", "message")] == ["noted", "7", "half way"]
 
 
 def test_a_file_comes_back_byte_for_byte(cluster, heard):
@@ -204,6 +215,39 @@ def test_the_same_seam_takes_a_scheduler_by_its_address(tmp_path, heard):
             assert heard.end_of("wait")["state"] == "cancelled"
         finally:
             cluster.close()
+
+
+def test_a_scheduler_elsewhere_is_reached_with_its_certificates(tmp_path, heard, dask_processes):
+    """A scheduler and two workers that know each other by TLS; both work at once."""
+    far = dask_processes
+    cluster = Cluster(far.address, tmp_path, certificates=far.certificates)
+    try:
+        cluster.submit("far", tasks.double, 4, heard)
+        ending = heard.end_of("far")
+        assert ending["result"] is not None
+        assert ending["result"]["value"] == 8
+        for name in ("left", "right"):
+            cluster.submit(name, tasks.wait, None, heard)
+        assert {heard.started.get(timeout=PATIENCE) for _ in range(3)} == {"far", "left", "right"}
+        assert cluster.workers() == 2
+        for name in ("left", "right"):
+            cluster.cancel(name, grace=30.0)
+            assert heard.end_of(name)["state"] == "cancelled"
+        assert cluster.became == {"submitted": 3, "done": 1, "cancelled": 2}
+    finally:
+        cluster.close()
+
+
+def test_a_stranger_is_not_let_in(tmp_path, heard, dask_processes):
+    """Certificates of another authority; whoever got in would run code there."""
+    from dask import config
+
+    strangers = make_certificates(tmp_path)
+    with config.set({"distributed.comm.timeouts.connect": "2s"}):
+        cluster = Cluster(dask_processes.address, tmp_path, certificates=strangers)
+        with pytest.raises(Unavailable):
+            cluster.submit("stranger", tasks.double, 1, heard)
+        cluster.close()
 
 
 def test_workers_that_cannot_be_reached_are_a_sentence(tmp_path, heard, monkeypatch):

@@ -1,4 +1,4 @@
-"""How a browser gets its session and the page; health; static files."""
+"""How a browser gets its session and the page; static files."""
 
 import re
 
@@ -78,12 +78,6 @@ def test_static_files_have_their_types_and_are_asked_for_again(client):
     assert icon.headers["cache-control"] == "no-cache"
     unchanged = client.get("/static/icon.svg", headers={"If-None-Match": icon.headers["etag"]})
     assert unchanged.status_code == 304
-
-
-def test_health(client):
-    assert client.get("/healthz").json() == {"state": "running"}
-    ready = client.get("/readyz")
-    assert ready.json()["state"] in ("ready", "compiling")
 
 
 def test_an_unknown_address_and_a_wrong_method_are_problems(client):

@@ -2,24 +2,18 @@
 
 import asyncio
 import threading
-from collections.abc import Callable, Coroutine
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
 from ridetune.app.errors import Busy, Unavailable
 from ridetune.app.pool import Pool
 
+from .loop import in_a_loop
 
-def pool_of(**told: int) -> Pool:
+
+def pool_of(**told: Any) -> Pool:
     """One that takes much, one at a time, unless told otherwise."""
     return Pool("simulations", **({"width": 1, "share": 9, "most": 99, "at_once": 9} | told))
-
-
-def in_a_loop(run: Callable[[], Coroutine[Any, Any, Any]]) -> Any:
-    """What a coroutine returns, in a thread of its own: a browser's loop may run in this one."""
-    with ThreadPoolExecutor(1) as pool:
-        return pool.submit(lambda: asyncio.run(run())).result()
 
 
 def test_no_more_runs_at_once_than_the_pool_is_wide():
@@ -75,6 +69,32 @@ def test_a_full_queue_is_refused_at_once():
         await first
 
     in_a_loop(run)
+    pool.close()
+
+
+def test_who_is_refused_comes_back_when_there_is_room():
+    """Functions took 5 s lately; two of them, one at a time, are done in 10 s."""
+    now = [0.0]
+    told = []
+    pool = pool_of(most=2, worked=lambda *times: told.append(times), clock=lambda: now[0])
+    go = threading.Event()
+
+    def five_seconds() -> None:
+        now[0] += 5
+
+    async def run() -> str:
+        for _ in range(50):
+            await pool.run("before", five_seconds)
+        first = [asyncio.create_task(pool.run("one", lambda: go.wait(10))) for _ in range(2)]
+        await asyncio.sleep(0)
+        with pytest.raises(Unavailable) as refused:
+            await pool.run("two", lambda: None)
+        go.set()
+        await asyncio.gather(*first)
+        return refused.value.headers["Retry-After"]
+
+    assert in_a_loop(run) == "10"
+    assert told[:50] == [(0.0, 5.0)] * 50
     pool.close()
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from ridetune.app.errors import StartError
-from ridetune.app.settings import Settings, is_loopback
+from ridetune.app.settings import Certificates, Settings, is_loopback
 
 
 def test_an_argument_goes_before_the_environment_and_that_before_the_default():
@@ -24,6 +24,10 @@ def test_limits_are_set_one_by_one():
     [
         ("RIDETUNE_PORT", "http"),
         ("RIDETUNE_PORT", "70000"),
+        ("RIDETUNE_GRACE", "-1"),
+        ("RIDETUNE_NOTICE", "soon"),
+        ("RIDETUNE_LOG", "xml"),
+        ("RIDETUNE_LOG_LEVEL", "loud"),
         ("RIDETUNE_LIMIT_SESSIONS", "many"),
         ("RIDETUNE_LIMIT_SESSIONS", "-1"),
         ("RIDETUNE_LIMIT_SESSIONS", "2.5"),
@@ -33,6 +37,22 @@ def test_limits_are_set_one_by_one():
 def test_a_value_out_of_range_is_named(name, value):
     with pytest.raises(StartError, match=value):
         Settings.from_environment(data="x", environment={name: value})
+
+
+def test_a_scheduler_behind_tls_needs_its_three_files(tmp_path):
+    names = ("CA", "CERT", "KEY")
+    environment = {"RIDETUNE_CLUSTER": "tls://scheduler:8786"}
+    for name in names:
+        with pytest.raises(StartError, match=f"RIDETUNE_CLUSTER_{name} is not set"):
+            Settings.from_environment(data="x", environment=environment)
+        environment[f"RIDETUNE_CLUSTER_{name}"] = str(tmp_path / name)
+        with pytest.raises(StartError, match=f"RIDETUNE_CLUSTER_{name} .* cannot be read"):
+            Settings.from_environment(data="x", environment=environment)
+        (tmp_path / name).touch()
+    files = Settings.from_environment(data="x", environment=environment).certificates
+    assert files == Certificates(*(tmp_path / name for name in names))
+    with pytest.raises(StartError, match="only with a RIDETUNE_CLUSTER at tls://"):
+        Settings.from_environment(data="x", environment=environment | {"RIDETUNE_CLUSTER": ""})
 
 
 def test_a_misspelt_limit_is_refused_with_the_nearest():

@@ -2,8 +2,11 @@
 
 import time
 
+import msgspec
 import pytest
 from ridetune.app import viewer
+from ridetune.app.errors import Busy, Unavailable
+from ridetune.app.settings import Limits
 from ridetune.app.viewer import Viewers
 from ridetune.engine.vehicle_file import reference_vehicles
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -135,6 +138,50 @@ def test_viewers_listen_on_loopback_only(viewers):
 def test_no_tab_can_open_a_tunnel_to_the_world(viewers):
     handlers = viewers.start("a").server._websock_server._incoming_handlers
     assert messages.ShareUrlRequest not in handlers
+
+
+def test_a_session_has_its_view_in_so_many_tabs(viewers):
+    viewers.limits = Limits(session_viewers=2)
+    for _ in range(2):
+        viewers.watch("a", 1)
+    with pytest.raises(Busy, match="2 tabs"):
+        viewers.watch("a", 1)
+    viewers.watch("a", -1)
+    assert viewers.watch("a", 1).watchers == 2
+
+
+def test_a_view_that_nobody_watches_makes_room(viewers, car):
+    viewers.limits = Limits(viewers=1)
+    viewers.show("unwatched", car)
+    viewers.watch("watched", 1)
+    assert viewers.count() == 1
+    with pytest.raises(Unavailable):
+        viewers.watch("late", 1)
+    viewers.show("late", car)
+    assert viewers.count() == 1
+
+
+def test_a_tab_too_many_is_told_so(client, visitor):
+    client.app.state.services.viewers.limits = Limits(session_viewers=1)
+    with (
+        open_socket(client, visitor),
+        pytest.raises(WebSocketDisconnect) as refused,
+        open_socket(client, visitor),
+    ):
+        pass
+    assert refused.value.code == 1013
+
+
+def test_a_browser_that_floods_is_hung_up_on(client, visitor):
+    """One message a second leaves room for five at once."""
+    harmless = msgspec.msgpack.encode(messages.GuiCloseModalMessage("none").as_serializable_dict())
+    client.app.state.services.viewers.limits = Limits(viewer_messages=1)
+    with open_socket(client, visitor) as socket:
+        for _ in range(6):
+            socket.send_bytes(harmless)
+        while (last := socket.receive())["type"] == "websocket.send":
+            pass
+    assert (last["type"], last["code"]) == ("websocket.close", 1008)
 
 
 def test_only_unwatched_viewers_are_reaped(viewers, monkeypatch):

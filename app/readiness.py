@@ -1,0 +1,142 @@
+"""Whether the service can do its work, told part by part.
+
+It is looked at once a second at most, however often it is asked for, and never on the event loop: a
+part that is silent for `PATIENCE` is not ready, and is not asked again before it has answered.
+"""
+
+import asyncio
+import logging
+import tempfile
+import threading
+import time
+from collections.abc import Awaitable, Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+from urllib.parse import urlsplit
+
+from sqlalchemy import select
+
+from .database import Database
+from .draining import GOING, Draining
+from .tables import schema_version
+from .warmup import WarmUp
+
+log = logging.getLogger(__name__)
+
+PATIENCE = 1.0
+KEPT_FOR = 1.0
+SCHEDULER_PORT = 8786
+
+State = Literal["ready", "compiling", "draining", "failed"]
+
+
+@dataclass(frozen=True)
+class Part:
+    """What one part of the service says of itself."""
+
+    state: State
+    message: str
+
+    @property
+    def ready(self) -> bool:
+        """Whether it does its work."""
+        return self.state == "ready"
+
+
+class Readiness:
+    """The parts of one service; for the event loop."""
+
+    def __init__(
+        self,
+        draining: Draining,
+        warmup: WarmUp,
+        database: Database,
+        data: Path,
+        cluster: str,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+    ):
+        """`data` is the data directory, `cluster` a scheduler's address or empty."""
+        self._draining, self._warmup, self._clock = draining, warmup, clock
+        self._looks: dict[str, tuple[Callable[[], Awaitable[object]], str]] = {
+            "database": (
+                _Apart(lambda: _read(database)),
+                "The database does not answer.",
+            ),
+            "data_directory": (
+                _Apart(lambda: _write(data)),
+                "The data directory cannot be written, or its disk is full.",
+            ),
+        }
+        if cluster:
+            self._looks["cluster"] = (
+                lambda: _reach(cluster),
+                "The job workers' scheduler cannot be reached; jobs wait for it.",
+            )
+        self._seen: dict[str, Part] = {}
+        self._looked = -KEPT_FOR
+        self._one = asyncio.Lock()
+
+    async def parts(self) -> dict[str, Part]:
+        """Every part by its name, what is first to be mended first."""
+        async with self._one:
+            if self._clock() - self._looked >= KEPT_FOR:
+                seen = await asyncio.gather(*(self._look(name) for name in self._looks))
+                self._seen = dict(zip(self._looks, seen, strict=True))
+                self._looked = self._clock()
+        going = self._draining.begun
+        return {
+            "service": Part("draining", GOING) if going else Part("ready", "It takes requests."),
+            "kernels": Part(self._warmup.state, self._warmup.message),
+            **self._seen,
+        }
+
+    async def _look(self, name: str) -> Part:
+        look, complaint = self._looks[name]
+        try:
+            await asyncio.wait_for(look(), PATIENCE)
+        except Exception as error:
+            if name not in self._seen or self._seen[name].ready:
+                log.warning("%s is not ready: %r", name, error)
+            return Part("failed", complaint)
+        return Part("ready", "Ready.")
+
+
+class _Apart:
+    """Work on a thread of its own that may hang; not begun again before it has ended."""
+
+    def __init__(self, work: Callable[[], object]):
+        self._work = work
+        self._answer: Future[object] | None = None
+
+    async def __call__(self) -> object:
+        if self._answer is None or self._answer.done():
+            self._answer = Future()
+            threading.Thread(target=self._run, args=(self._answer,), daemon=True).start()
+        return await asyncio.shield(asyncio.wrap_future(self._answer))
+
+    def _run(self, answer: "Future[object]") -> None:
+        try:
+            answer.set_result(self._work())
+        except Exception as error:
+            answer.set_exception(error)
+
+
+def _read(database: Database) -> None:
+    with database.reading() as connection:
+        connection.execute(select(schema_version.c.version)).all()
+
+
+def _write(folder: Path) -> None:
+    with tempfile.TemporaryFile(dir=folder) as file:
+        file.write(bytes(4096))
+        file.flush()
+
+
+async def _reach(address: str) -> None:
+    """Connect to a scheduler at `tls://host:port`."""
+    place = urlsplit(address if "//" in address else f"//{address}")
+    _, writer = await asyncio.open_connection(place.hostname, place.port or SCHEDULER_PORT)
+    writer.close()
