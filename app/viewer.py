@@ -1,8 +1,9 @@
 """The 3D view: one viser server a session, shown through this service's own address.
 
-viser runs a websocket server of its own on a loopback port; nothing else of it is used. Its
-single-file page is served here with a bridge script in front of it, and only the websocket is
-passed on. So there is one origin and one port, and nobody gets at a car without its session.
+viser runs a websocket server of its own on a loopback port, which takes nobody but the relay here
+(viser_servers.py); nothing else of it is used. Its single-file page is served here with a bridge
+script in front of it, and only the websocket is passed on. So there is one origin and one port, and
+nobody gets at a car without its session.
 viser is imported with the first view: it takes longer to load than the rest of the service.
 """
 
@@ -25,6 +26,7 @@ from ..engine.vehicle import Vehicle
 from .access import session_of
 from .errors import NotFound
 from .package_files import package_folder
+from .viser_servers import ADMISSION, closed_server
 
 FOG = (18, 22, 27)
 GROUND = (120, 124, 130)
@@ -42,11 +44,10 @@ class Viewer:
 
     def __init__(self):
         import rich
-        import viser
         from viser import _messages as messages
 
         rich.get_console().quiet = True
-        self.server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        self.server = closed_server()
         self.watchers = 0
         self.seen = time.monotonic()
         # Any tab could ask for a public tunnel to this server.
@@ -179,6 +180,7 @@ async def _pass_on(websocket: WebSocket, address: str) -> None:
     offered = [p for p in websocket.scope["subprotocols"] if p.startswith("viser-v")][:1]
     async with connect(
         address,
+        additional_headers=ADMISSION,
         subprotocols=offered or None,
         compression=None,
         max_size=MESSAGE_BYTES,
