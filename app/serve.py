@@ -9,7 +9,9 @@ from pathlib import Path
 
 import uvicorn
 
+from .addresses import is_loopback
 from .errors import StartError
+from .invitation import link, link_command, note_address
 from .main import create_app
 from .settings import Settings
 from .store import Store
@@ -21,27 +23,52 @@ WAITING = 1024
 
 def serve(settings: Settings) -> None:
     """Serve; StartError with a sentence if the address or the data directory cannot be had."""
-    settings.check_bind()
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
     _allow_many_files()
     _find_cache(settings)
     with _listen(settings) as listener:
         store = Store(settings.data, settings.limits, settings.database)
-        host, port = listener.getsockname()[:2]
-        shown = f"[{host}]" if ":" in host else host
-        invitation = "?token=<RIDETUNE_TOKEN>" if settings.token else ""
-        print(f"ridetune serves http://{shown}:{port}/{invitation} (data in {settings.data})")
+        try:
+            settings.check_bind(keys=store.keys.any())
+        except StartError:
+            store.close()
+            raise
+        _invite(settings, store, _address(settings, listener))
         config = uvicorn.Config(
             create_app(settings, store=store),
             log_level="warning",
             access_log=False,
             server_header=False,
+            proxy_headers=False,  # what counts is who connects, see proxy_login.py
             ws_per_message_deflate=False,
             timeout_graceful_shutdown=GRACE_SECONDS,
         )
         # Ctrl-C has ended the service in good order when uvicorn passes it on.
         with contextlib.suppress(KeyboardInterrupt):
             uvicorn.Server(config).run(sockets=[listener])
+
+
+def _address(settings: Settings, listener: socket.socket) -> str:
+    """Where visitors find the service."""
+    host, port = listener.getsockname()[:2]
+    return settings.public_url or f"http://{f'[{host}]' if ':' in host else host}:{port}"
+
+
+def _invite(settings: Settings, store: Store, address: str) -> None:
+    """Tell where the service is and how to get in."""
+    note_address(settings, address)
+    if not settings.login:
+        told = f"ridetune serves {address}/ to everybody on this machine."
+    elif settings.token or settings.proxy_user_header or not is_loopback(settings.host):
+        token = "?token=<RIDETUNE_TOKEN>" if settings.token else ""
+        told = f"ridetune serves {address}/{token}"
+    else:
+        told = (
+            f"Open {link(address, store.browsers.make_link())}\n"
+            "This link lets one browser in, which then stays let in; for another: "
+            f"{link_command(settings)}"
+        )
+    print(f"{told}\nData are kept in {settings.data}.", flush=True)
 
 
 def _listen(settings: Settings) -> socket.socket:

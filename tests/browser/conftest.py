@@ -49,12 +49,16 @@ NOISE = re.compile(r"THREE\.Clock|GPU stall|WebGL.*software|swiftshader", re.IGN
 
 
 class Service:
-    """`ridetune serve` as a process of its own."""
+    """`ridetune serve` as a process of its own, which lets everybody in unless there is a `login`.
 
-    def __init__(self, data: Path, port: int = 0):
+    link : what lets one browser in then
+    """
+
+    def __init__(self, data: Path, port: int = 0, *, login: bool = False):
         self.data = data
         code = "from ridetune.app.cli import main; raise SystemExit(main())"
         command = [sys.executable, "-c", code, "serve", "--data", str(data), "--port", str(port)]
+        command += [] if login else ["--no-login"]
         self.log = (data.parent / f"{data.name}.log").open("ab")
         self.process = subprocess.Popen(
             command,
@@ -69,6 +73,7 @@ class Service:
         assert found, f"the service did not start: {line or Path(self.log.name).read_text()}"
         self.port = int(found[1])
         self.address = found[0]
+        self.link = line.split()[1]
         self._wait_until_ready()
 
     def _wait_until_ready(self) -> None:
