@@ -13,13 +13,15 @@ from .settings import Settings
 
 DAYS = round(BROWSER_SECONDS / 86400)
 HOURS = round(LINK_SECONDS / 3600)
+UNSAID = {"Referrer-Policy": "no-referrer", "Cache-Control": "no-store"}
+"""Of pages whose address may hold a token."""
 
 
 def not_let_in(request: Request, settings: Settings) -> HTMLResponse:
     """Who comes without anything that lets them in."""
     return _page(
         "This browser has not been let in yet",
-        _text("ridetune shows its cars and recordings to those only whom it was told to let in."),
+        _text("The cars and recordings here are for those who were let in."),
         *_ways_in(request, settings),
     )
 
@@ -29,10 +31,10 @@ def link_used_up(request: Request, settings: Settings) -> HTMLResponse:
     return _page(
         "This link has been used, or is too old",
         _text(
-            f"A link lets one browser in, once and within {HOURS} hours. If it was this browser, "
-            "go on; another one needs a link of its own."
+            f"A link lets one browser in, once and within {HOURS} hours. If it was this browser "
+            "that it let in, go on to the page; any other needs a link of its own."
         ),
-        _button("/", "Go on"),
+        _button("/", "Go on to the page"),
         *_ways_in(request, settings),
     )
 
@@ -58,7 +60,7 @@ def knock_again(request: Request) -> HTMLResponse:
     return HTMLResponse(
         f'<!doctype html><meta http-equiv="refresh" content="0; url={address}">'
         f'<a href="{address}">Continue to ridetune</a>',
-        headers={"Referrer-Policy": "no-referrer"},
+        headers=UNSAID,
     )
 
 
@@ -67,15 +69,15 @@ def _ways_in(request: Request, settings: Settings) -> list[str]:
     ways = []
     if settings.proxy_user_header:
         place = _link(settings.public_url) if settings.public_url else "its public address"
-        ways.append(f"<p>Sign in at {place}.</p>")
+        ways.append(f"<p>You may sign in at {place}.</p>")
     if settings.token:
         ways.append(
-            "<p>If you were given the service’s token, put it behind the address: "
-            "<code>/?token=…</code></p>"
+            "<p>You may open it with the service’s token, if you know that, put behind the "
+            "address: <code>/?token=…</code></p>"
         )
     ways.append(
-        f"<p>{'Or, on' if ways else 'On'} the machine where ridetune runs, type this in a terminal "
-        "and open the link that it prints in this browser:</p>"
+        "<p>A new link lets this browser in. Type this in a terminal on the machine where ridetune "
+        "runs, and open here what it prints:</p>"
         f"<pre><code>{escape(link_command(settings))}</code></pre>"
         "<p class=soft>The browser then stays let in, over restarts too, until it has not come "
         f"for {DAYS} days.</p>"
@@ -94,7 +96,7 @@ def _text(sentence: str) -> str:
 
 
 def _button(address: str, label: str) -> str:
-    return f'<p><a class="button primary" href="{address}">{escape(label)}</a></p>'
+    return f'<p><a class="button" href="{address}">{escape(label)}</a></p>'
 
 
 def _link(address: str) -> str:
@@ -104,4 +106,4 @@ def _link(address: str) -> str:
 def _page(title: str, *parts: str, status: int = 403) -> HTMLResponse:
     frame = (package_folder("static") / "message.html").read_text(encoding="utf-8")
     shown = Template(frame).substitute(title=escape(title), body="\n".join(parts))
-    return HTMLResponse(shown, status)
+    return HTMLResponse(shown, status, headers=UNSAID)
