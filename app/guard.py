@@ -68,6 +68,9 @@ class Guard:
         if reason := self._refusal(scope):
             await problem(403, "forbidden", reason)(scope, receive, send)
             return
+        if "\0" in scope["path"]:  # which a database may refuse to look for
+            await problem(404, "not-found", "No address has a NUL.")(scope, receive, send)
+            return
         limit = self._body_limit(scope)
         too_large = (
             f"The body is over the limit of {limit / 1e6:.3g} MB; send a smaller one, "
