@@ -34,6 +34,7 @@ ARGUMENTS = [
     "--ignore-gpu-blocklist",
     "--disable-accelerated-2d-canvas",
 ]
+PROGRAM = [sys.executable, "-c", "from ridetune.app.cli import main; raise SystemExit(main())"]
 SAMPLES = Path(__file__).parents[2] / "sample_runs"
 PATIENCE = 60.0
 AWAY = (
@@ -56,8 +57,7 @@ class Service:
 
     def __init__(self, data: Path, port: int = 0, *, login: bool = False):
         self.data = data
-        code = "from ridetune.app.cli import main; raise SystemExit(main())"
-        command = [sys.executable, "-c", code, "serve", "--data", str(data), "--port", str(port)]
+        command = [*PROGRAM, "serve", "--data", str(data), "--port", str(port)]
         command += [] if login else ["--no-login"]
         self.log = (data.parent / f"{data.name}.log").open("ab")
         self.process = subprocess.Popen(
