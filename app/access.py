@@ -23,7 +23,9 @@ def session_of(connection: HTTPConnection, sid: str) -> str:
     owners = services_of(connection).store.owners
     token = bearer(connection.headers) or cookies.session_token(connection, sid)
     if not owners.opens(sid, user=user_of(connection), token=token):
-        raise NotFound("There is no such session, or it is not yours; open the start page.")
+        raise NotFound(
+            "There is no such session, or it is not yours; the start page leads to your own."
+        )
     return sid
 
 

@@ -51,7 +51,8 @@ def serve(settings: Settings) -> None:
 def _address(settings: Settings, listener: socket.socket) -> str:
     """Where visitors find the service."""
     host, port = listener.getsockname()[:2]
-    return settings.public_url or f"http://{f'[{host}]' if ':' in host else host}:{port}"
+    shown = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(host, f"[{host}]" if ":" in host else host)
+    return settings.public_url or f"http://{shown}:{port}"
 
 
 def _invite(settings: Settings, store: Store, address: str) -> None:

@@ -34,6 +34,8 @@ GROUND = (120, 124, 130)
 MESSAGE_BYTES = 64 << 20
 UNWATCHED_SECONDS = 600.0
 """How long a viewer without a tab is kept."""
+LOOK_AGAIN_SECONDS = 10.0
+"""How often it is looked at anew whether an open view is still its viewer's."""
 EYE, TARGET = (3.3, -4.1, 1.45), (0.0, 0.0, 0.5)
 
 router = APIRouter()
@@ -161,7 +163,7 @@ async def relay(websocket: WebSocket, sid: str) -> None:
         return
     viewer = await run_in_threadpool(viewers.watch, sid, 1)
     try:
-        await _pass_on(websocket, viewer.address)
+        await _pass_on(websocket, sid, viewer.address)
     except (OSError, WebSocketException):
         await _hang_up(websocket, 1013, "The 3D view is restarting.")
     finally:
@@ -175,8 +177,8 @@ async def _hang_up(websocket: WebSocket, code: int, reason: str = "") -> None:
         await websocket.close(code, reason)
 
 
-async def _pass_on(websocket: WebSocket, address: str) -> None:
-    """Carry messages both ways until either side hangs up."""
+async def _pass_on(websocket: WebSocket, sid: str, address: str) -> None:
+    """Carry messages both ways until either side hangs up, or the session is theirs no more."""
     offered = [p for p in websocket.scope["subprotocols"] if p.startswith("viser-v")][:1]
     async with connect(
         address,
@@ -191,6 +193,7 @@ async def _pass_on(websocket: WebSocket, address: str) -> None:
         ways = [
             asyncio.create_task(_to_viser(websocket, upstream)),
             asyncio.create_task(_to_browser(websocket, upstream)),
+            asyncio.create_task(_until_lost(websocket, sid)),
         ]
         try:
             await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
@@ -198,6 +201,15 @@ async def _pass_on(websocket: WebSocket, address: str) -> None:
             for way in ways:
                 way.cancel()
             await asyncio.gather(*ways, return_exceptions=True)
+
+
+async def _until_lost(websocket: WebSocket, sid: str) -> None:
+    """Hang up once the session is the caller's no more: deleted, or their key removed."""
+    with suppress(NotFound):
+        while True:
+            await asyncio.sleep(LOOK_AGAIN_SECONDS)
+            await run_in_threadpool(session_of, websocket, sid)
+    await _hang_up(websocket, 1008)
 
 
 async def _to_viser(websocket: WebSocket, upstream: ClientConnection) -> None:

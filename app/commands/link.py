@@ -12,5 +12,5 @@ def link(options: Namespace) -> None:
     """Print a link to where the service was found last."""
     settings = Settings.from_environment(data=options.data)
     with kept(settings) as database:
-        address = settings.public_url or invitation.last_address(settings)
+        address = invitation.last_address(settings)
         print(f"Open {invitation.link(address, BrowserStore(database).make_link())}")

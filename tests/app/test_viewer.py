@@ -90,6 +90,22 @@ def test_the_relay_brings_the_scene_to_the_browser(client, visitor, car):
     assert len(received) > 1000
 
 
+def read_on(socket):
+    while True:
+        socket.receive_bytes()
+
+
+def test_an_open_view_ends_with_the_session(client, visitor, monkeypatch):
+    """Whatever ends it: that it is deleted, or a key removed."""
+    monkeypatch.setattr(viewer, "LOOK_AGAIN_SECONDS", 0.05)
+    with open_socket(client, visitor) as socket:
+        assert socket.receive_bytes()
+        client.app.state.services.store.sessions.delete(visitor.id)
+        with pytest.raises(WebSocketDisconnect) as refused:
+            read_on(socket)
+    assert refused.value.code == 1008
+
+
 def test_a_client_of_another_version_is_told_so(client, visitor):
     with (
         open_socket(client, visitor, "viser-v0.0.1") as socket,
