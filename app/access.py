@@ -1,74 +1,59 @@
-"""Who may use a session: whoever brings its token, as a cookie or as a bearer.
+"""Who may use a session: the user to whom it belongs, or whoever brings its token.
 
-The token is random, given once, and kept only as a hash. A session that is not the caller's looks
-exactly like one that does not exist.
+The token comes as a cookie or as a bearer; it is random, given once, and kept only as a hash. A
+session that is not the caller's looks exactly like one that does not exist.
 """
 
-import hmac
 from typing import Annotated
 
 from fastapi import Depends, Request, Response
 from starlette.requests import HTTPConnection
 
+from . import cookies
 from .callers import caller_of
-from .errors import Forbidden, NotFound
+from .errors import NotFound
+from .login import is_let_in, require_let_in, user_of
+from .origins import bearer
+from .owner_store import OwnSession
 from .samples import sample_project
 from .services import services_of
 
-COOKIE = "ridetune_"
-COOKIE_SECONDS = 400 * 24 * 3600
-
 
 def session_of(connection: HTTPConnection, sid: str) -> str:
-    """The session's id if the caller holds its token; NotFound otherwise."""
-    token = bearer(connection) or connection.cookies.get(COOKIE + sid, "")
-    if not token or not services_of(connection).store.sessions.holds(sid, token):
-        raise NotFound("There is no such session, or it is not yours; open the start page.")
+    """The session's id if it is the caller's; NotFound otherwise."""
+    owners = services_of(connection).store.owners
+    token = bearer(connection.headers) or cookies.session_token(connection, sid)
+    if not owners.opens(sid, user=user_of(connection), token=token):
+        raise NotFound(
+            "There is no such session, or it is not yours; the start page leads to your own."
+        )
     return sid
 
 
-def own_session(request: Request) -> str | None:
-    """A session the browser already holds the cookie of, the latest it was given."""
-    store = services_of(request).store
-    for name, token in reversed(request.cookies.items()):
-        sid = name.removeprefix(COOKIE)
-        if sid != name and store.sessions.holds(sid, token):
-            return sid
-    return None
+def own_sessions(connection: HTTPConnection) -> list[OwnSession]:
+    """The caller's sessions, those used latest first."""
+    brought = bearer(connection.headers)
+    tokens = [brought] if brought else list(cookies.session_tokens(connection))
+    return services_of(connection).store.owners.sessions(user=user_of(connection), tokens=tokens)
 
 
-def bearer(connection: HTTPConnection) -> str:
-    """Token in the Authorization header, or nothing."""
-    kind, _, token = connection.headers.get("authorization", "").partition(" ")
-    return token.strip() if kind.lower() == "bearer" else ""
+def require_visitor(request: Request) -> None:
+    """Refuse who neither may use the service nor holds a session of it."""
+    if not is_let_in(request) and not own_sessions(request):
+        require_let_in(request)
 
 
-def require_service_token(connection: HTTPConnection, token: str) -> None:
-    """Refuse who does not bring the service's own token, where one is configured."""
-    expected = services_of(connection).settings.token
-    if expected and not hmac.compare_digest(token.encode(), expected.encode()):
-        raise Forbidden(
-            "This service asks for its token; open the link with ?token=... that it was started "
-            "with, or send it as a bearer."
-        )
-
-
-def give_session(connection: HTTPConnection, response: Response) -> tuple[str, str]:
-    """Id and token of a fresh session, its cookie set on the response."""
-    services_of(connection).callers.open_session(caller_of(connection))
-    project = sample_project()
+def give_session(connection: HTTPConnection, response: Response) -> dict[str, str]:
+    """A fresh session: its id, and its token where no user owns it, set as a cookie as well."""
+    project, user = sample_project(), user_of(connection)
+    services_of(connection).callers.open_session(user or caller_of(connection))
     sid, token = services_of(connection).store.sessions.create(
-        project.vehicle, project.measurements
+        project.vehicle, project.measurements, user
     )
-    response.set_cookie(
-        COOKIE + sid,
-        token,
-        max_age=COOKIE_SECONDS,
-        httponly=True,
-        samesite="strict",
-        secure=connection.url.scheme == "https",
-    )
-    return sid, token
+    if user is not None:
+        return {"id": sid}
+    cookies.give_session_token(connection, response, sid, token)
+    return {"id": sid, "token": token}
 
 
 def _session(request: Request, sid: str) -> str:

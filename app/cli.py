@@ -82,6 +82,8 @@ def command_line() -> Parser:
         return command
 
     takes.serve(add("serve", _serve, "Serve the page and the REST interface."))
+    takes.link(add("link", _link, "Make a link that lets one more browser in."))
+    takes.keys(add("keys", _keys, "Make, show and end the API keys of programs."))
     takes.simulate(add("simulate", _simulate, "Simulate a car on a road, from rims or posts."))
     takes.channels(add("channels", _channels, "Show which channels a recording's columns are."))
     takes.sweep(add("sweep", _sweep, "Simulate many cars, one row a car."))
@@ -112,7 +114,23 @@ def _serve(options: argparse.Namespace) -> None:
     from .serve import serve
     from .settings import Settings
 
-    serve(Settings.from_environment(host=options.host, port=options.port, data=options.data))
+    serve(
+        Settings.from_environment(
+            host=options.host, port=options.port, data=options.data, login=options.login
+        )
+    )
+
+
+def _link(options: argparse.Namespace) -> None:
+    from .commands.link import link
+
+    link(options)
+
+
+def _keys(options: argparse.Namespace) -> None:
+    from .commands.keys import keys
+
+    keys(options)
 
 
 @_compiling

@@ -17,7 +17,30 @@ SEVERAL: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
 def serve(command: Parser) -> None:
     command.add_argument("--host", help="address to listen on, 127.0.0.1 unless told")
     command.add_argument("--port", type=int, help="port to listen on, 8000 unless told")
-    command.add_argument("--data", metavar="DIR", type=Path, help="where sessions are kept")
+    _add_data(command)
+    command.add_argument(
+        "--no-login",
+        dest="login",
+        action="store_const",
+        const=False,
+        help="let everybody on this machine in, without a link",
+    )
+
+
+def link(command: Parser) -> None:
+    _add_data(command)
+
+
+def keys(command: Parser) -> None:
+    actions = command.add_subparsers(metavar="add|list|remove", dest="action", required=True)
+    command.commands = actions.choices
+    add = actions.add_parser("add", help="make a key for a program; it is shown once")
+    shown = actions.add_parser("list", help="show which keys there are")
+    remove = actions.add_parser("remove", help="end a key")
+    for action in (add, remove):
+        action.add_argument("name", metavar="NAME", help="what the key is called")
+    for action in (add, shown, remove):
+        _add_data(action)
 
 
 def backup(command: Parser) -> None:
@@ -145,6 +168,10 @@ def advise(command: Parser) -> None:
     _add_mappings(command)
     _add_noise(command, "noise of the recordings and, without any, of the sensors")
     command.add_argument("--json", metavar="FILE", help="the advice as JSON")
+
+
+def _add_data(command: Parser) -> None:
+    command.add_argument("--data", metavar="DIR", type=Path, help="where sessions are kept")
 
 
 def _add_identification(command: Parser) -> None:

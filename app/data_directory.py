@@ -1,5 +1,6 @@
 """The folder that holds what the service keeps: of one process, or of those that share a database.
 
+    address             where the service was found last
     owner.lock          locked while a service runs; says which process that is
     ridetune.sqlite     the database, and in its place
     postgresql.id       which PostgreSQL database has the rows of these files
@@ -39,7 +40,7 @@ class DataDirectory:
         self.path = path
         self._lock: int | None = None
         try:
-            path.mkdir(parents=True, exist_ok=True)
+            make_private(path)
             self.originals = path / "originals"
             self.originals.mkdir(exist_ok=True)
             self.reading.mkdir(exist_ok=True)
@@ -98,7 +99,7 @@ class DataDirectory:
     @property
     def database(self) -> Path:
         """Place of the database file."""
-        return self.path / DATABASE
+        return database_of(self.path)
 
     @property
     def scratch(self) -> Path:
@@ -165,6 +166,16 @@ def _write(place: Path, data: bytes) -> None:
         file.write(data)
         file.flush()
         os.fsync(file.fileno())
+
+
+def database_of(path: Path) -> Path:
+    """Place of the database in a data directory."""
+    return path / DATABASE
+
+
+def make_private(path: Path) -> None:
+    """Make a data directory; other users of the machine do not look into a new one."""
+    path.mkdir(mode=0o700, parents=True, exist_ok=True)
 
 
 def flush(place: Path) -> None:

@@ -1,18 +1,17 @@
 """The outermost layer: who may call, how much may be sent, what every reply says to the browser.
 
-Host must be on the list, or a page elsewhere could reach a local service by a name of its own
-(DNS rebinding). A request that changes something, and every websocket, must come from our own
-page or from no page at all. Bodies are counted, and timed, while they arrive.
+Host, page (origins.py) and proxy (proxy_login.py) are looked at first. Bodies are counted, and
+timed, while they arrive.
 """
 
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
-from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from . import origins, proxy_login
 from .bodies import Body
 from .problems import problem
 from .settings import Settings
@@ -27,9 +26,10 @@ HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Permissions-Policy": "camera=(), display-capture=(), geolocation=(), microphone=(), usb=()",
     "Cache-Control": "no-cache",
 }
-READING = ("GET", "HEAD", "OPTIONS")
 
 # A browser shows a refusal only if its upload was taken to the end: this much more is thrown away.
 DRAINED_BODIES = 10
@@ -44,6 +44,7 @@ class Guard:
 
     def __init__(self, app: ASGIApp, settings: Settings):
         self.app = app
+        self.settings = settings
         self.hosts = settings.host_names()
         self.limits = settings.limits
 
@@ -52,7 +53,7 @@ class Guard:
         if scope["type"] == "lifespan":
             await self.app(scope, receive, send)
         elif scope["type"] == "websocket":
-            if refusal(scope, self.hosts):
+            if self._refusal(scope):
                 await receive()
                 await send({"type": "websocket.close", "code": 1008})
             else:
@@ -60,9 +61,17 @@ class Guard:
         else:
             await self._http(scope, receive, _with_headers(send))
 
+    def _refusal(self, scope: Scope) -> str | None:
+        return origins.refusal(scope, self.hosts, self.settings.public_url) or proxy_login.refusal(
+            scope, self.settings
+        )
+
     async def _http(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if reason := refusal(scope, self.hosts):
+        if reason := self._refusal(scope):
             await problem(403, "forbidden", reason)(scope, receive, send)
+            return
+        if "\0" in scope["path"]:  # which a database may refuse to look for
+            await problem(404, "not-found", "No address has a NUL.")(scope, receive, send)
             return
         limit = self._body_limit(scope)
         too_large = (
@@ -84,29 +93,6 @@ class Guard:
         if scope["method"] == "PATCH" and scope["path"].endswith("/setup"):
             return min(SETUP_BYTES, self.limits.body_bytes)
         return self.limits.body_bytes
-
-
-def refusal(scope: Scope, hosts: frozenset[str]) -> str | None:
-    """Why a request may not come in, or None."""
-    headers = Headers(scope=scope)
-    host = headers.get("host", "").lower()
-    if _without_port(host) not in hosts:
-        return (
-            "This service does not answer to that host name; use its own address, or add the name "
-            "to RIDETUNE_ALLOWED_HOSTS."
-        )
-    if scope["type"] == "http" and scope["method"] in READING:
-        return None
-    origin = headers.get("origin")
-    foreign = origin is not None and urlsplit(origin.lower()).netloc != host
-    if foreign or headers.get("sec-fetch-site") in ("cross-site", "same-site"):
-        return "Requests from pages of another origin are refused; use the service's own page."
-    return None
-
-
-def _without_port(host: str) -> str:
-    name, colon, port = host.rpartition(":")
-    return name if colon and port.isdigit() else host
 
 
 def _announced(scope: Scope) -> int:

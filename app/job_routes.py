@@ -5,10 +5,11 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter, Depends, Request
 from fastapi.sse import EventSourceResponse, ServerSentEvent
+from starlette.concurrency import run_in_threadpool
 
-from .access import SessionId
+from .access import SessionId, session_of
 from .errors import NotFound
 from .frames import clean
 from .job_store import Job
@@ -94,12 +95,16 @@ def job_router(name: str, view: View) -> APIRouter:
 
     @router.get("/{jid}/events", response_class=EventSourceResponse)
     async def events(
-        sid: SessionId, services: Shared, known: Annotated[Job, Depends(of_kind)]
+        request: Request,
+        sid: SessionId,
+        services: Shared,
+        known: Annotated[Job, Depends(of_kind)],
     ) -> AsyncIterator[ServerSentEvent]:
         """The job's state now, then every change of state and progress, until its final state."""
         state, progress = None, known.progress
         try:
             async for job in services.jobs.follow(sid, known.id):
+                await run_in_threadpool(session_of, request, sid)
                 if job.progress != progress and job.progress:
                     progress = job.progress
                     yield ServerSentEvent(event="progress", data=clean(progress))
@@ -107,7 +112,7 @@ def job_router(name: str, view: View) -> APIRouter:
                     state = job.state
                     yield ServerSentEvent(event="state", data=job_to_json(job, view))
         except NotFound:
-            # Deleted while somebody watched.
+            # Deleted, or not theirs any more, while somebody watched.
             return
 
     @router.post("/{jid}/cancel", status_code=202)

@@ -24,6 +24,7 @@ from ..engine.parameters import (
 from ..engine.run_notes import DEFAULT_NOISE
 from ..engine.vehicle import numbers
 from ..engine.vehicle_file import reference_vehicles, vehicle_to_json
+from .access import require_visitor
 from .errors import NotFound
 from .plants import PLANTS
 from .schemas import RimsSettingsForm, RoadPreview, StartValues
@@ -31,7 +32,12 @@ from .services import Shared
 from .strict_json import StrictRoute
 from .uploads import Upload, openapi, receive
 
-router = APIRouter(prefix="/api", tags=["catalogue"], route_class=StrictRoute)
+router = APIRouter(
+    prefix="/api",
+    tags=["catalogue"],
+    route_class=StrictRoute,
+    dependencies=[Depends(require_visitor)],
+)
 
 Sensors = Annotated[Upload, Depends(receive("sensors.toml"))]
 

@@ -1,12 +1,12 @@
-"""The service's metrics in Prometheus' text format: for this machine, or for who has the token."""
+"""The service's metrics in Prometheus' text format: for this machine, or for who has a key."""
 
 from fastapi import APIRouter, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 
-from .access import bearer, require_service_token
+from .addresses import is_loopback
 from .errors import Forbidden
+from .login import brings_secret
 from .services import Shared
-from .settings import is_loopback
 
 router = APIRouter()
 
@@ -16,10 +16,11 @@ FORWARDED = ("forwarded", "via", "x-forwarded-for", "x-forwarded-host", "x-real-
 @router.get("/metrics", include_in_schema=False)
 def metrics(request: Request, services: Shared) -> Response:
     """Every number there is; looked up off the event loop."""
-    if not _is_from_here(request):
-        if not services.settings.token:
-            raise Forbidden("Metrics are for this machine; set RIDETUNE_TOKEN to ask with it.")
-        require_service_token(request, bearer(request))
+    if not (_is_from_here(request) or brings_secret(request)):
+        raise Forbidden(
+            "Metrics are for this machine, or for who sends a key of `ridetune keys add` or the "
+            "service's token as a bearer."
+        )
     return Response(generate_latest(services.metrics.registry), media_type=CONTENT_TYPE_LATEST)
 
 

@@ -1,12 +1,15 @@
 """Sessions: one visitor's car, its baseline, measurements, identifications and sweeps."""
 
+from dataclasses import asdict
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Request, Response
 
 from ..engine.vehicle_file import vehicle_from_json, vehicle_to_json
-from .access import COOKIE, SessionId, bearer, give_session, require_service_token
+from . import cookies
+from .access import SessionId, give_session, own_sessions
 from .job_routes import all_to_json
+from .login import require_let_in
 from .measurement_view import measurements_to_json
 from .routes_identifications import VIEW as IDENTIFICATION
 from .routes_sweeps import VIEW as SWEEP
@@ -22,10 +25,17 @@ VehicleBody = Annotated[JsonObject, Body(description="A vehicle as docs/files de
 
 @router.post("", status_code=201)
 def create(request: Request, response: Response) -> dict[str, str]:
-    """A fresh session with the sample project; its token comes as a cookie and in the body."""
-    require_service_token(request, bearer(request))
-    sid, token = give_session(request, response)
-    return {"id": sid, "token": token}
+    """A fresh session with the sample project. Its token comes as a cookie and in the body; who
+    brings a key, or is named by the proxy, owns it and needs none.
+    """
+    require_let_in(request)
+    return give_session(request, response)
+
+
+@router.get("")
+def sessions(request: Request) -> list[dict[str, Any]]:
+    """The caller's own sessions, those used latest first."""
+    return [asdict(one) for one in own_sessions(request)]
 
 
 @router.get("/{sid}")
@@ -44,13 +54,13 @@ def read(sid: SessionId, services: Shared) -> dict[str, Any]:
 
 
 @router.delete("/{sid}", status_code=204)
-def delete(sid: SessionId, services: Shared, response: Response) -> None:
+def delete(request: Request, sid: SessionId, services: Shared, response: Response) -> None:
     """Remove the session with all it holds; what runs in it is cancelled."""
     services.jobs.cancel_all(sid)
     if services.viewers is not None:
         services.viewers.stop(sid)
     services.store.sessions.delete(sid)
-    response.delete_cookie(COOKIE + sid)
+    cookies.forget_session(request, response, sid)
 
 
 @router.get("/{sid}/vehicle")

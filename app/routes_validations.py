@@ -55,7 +55,12 @@ def result(sid: SessionId, jid: str, services: Shared) -> FileResponse:
 def as_report(sid: SessionId, jid: str, services: Shared) -> HTMLResponse:
     """The report, as the command line writes it, in a sandbox of its own."""
     document = json.loads(_document(services, sid, jid).read_bytes())
-    return HTMLResponse(report(document), headers={"Content-Security-Policy": SERVED_POLICY})
+    # A sandbox cannot be had together with an opener policy.
+    headers = {
+        "Content-Security-Policy": SERVED_POLICY,
+        "Cross-Origin-Opener-Policy": "unsafe-none",
+    }
+    return HTMLResponse(report(document), headers=headers)
 
 
 def _document(services: Services, sid: str, jid: str) -> Any:

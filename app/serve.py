@@ -8,8 +8,10 @@ from pathlib import Path
 import uvicorn
 
 from . import logs
+from .addresses import is_loopback
 from .connection import connections
 from .errors import StartError
+from .invitation import link, link_command, note_address
 from .main import create_app
 from .server import CUT_OFF_SECONDS, Server
 from .settings import Settings
@@ -21,16 +23,17 @@ WAITING = 1024
 
 def serve(settings: Settings) -> None:
     """Serve; StartError with a sentence if the address or the data directory cannot be had."""
-    settings.check_bind()
     logs.configure(settings.log, settings.log_level)
     _allow_many_files()
     _find_cache(settings)
     with _listen(settings) as listener:
         store = Store(settings.data, settings.limits, settings.database)
-        host, port = listener.getsockname()[:2]
-        shown = f"[{host}]" if ":" in host else host
-        invitation = "?token=<RIDETUNE_TOKEN>" if settings.token else ""
-        print(f"ridetune serves http://{shown}:{port}/{invitation} (data in {settings.data})")
+        try:
+            settings.check_bind(keys=store.keys.any())
+        except StartError:
+            store.close()
+            raise
+        _invite(settings, store, _address(settings, listener))
         app = create_app(settings, store=store)
         http, websocket = connections(settings.limits)
         config = uvicorn.Config(
@@ -42,11 +45,36 @@ def serve(settings: Settings) -> None:
             log_level="warning",
             access_log=False,
             server_header=False,
+            proxy_headers=False,  # what counts is who connects, see proxy_login.py
             ws_per_message_deflate=False,
             timeout_graceful_shutdown=CUT_OFF_SECONDS,
         )
         server = Server(config, app.state.draining, grace=settings.grace, notice=settings.notice)
         server.run(sockets=[listener])
+
+
+def _address(settings: Settings, listener: socket.socket) -> str:
+    """Where visitors find the service."""
+    host, port = listener.getsockname()[:2]
+    shown = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(host, f"[{host}]" if ":" in host else host)
+    return settings.public_url or f"http://{shown}:{port}"
+
+
+def _invite(settings: Settings, store: Store, address: str) -> None:
+    """Tell where the service is and how to get in."""
+    note_address(settings, address)
+    if not settings.login:
+        told = f"ridetune serves {address}/ to everybody on this machine."
+    elif settings.token or settings.proxy_user_header or not is_loopback(settings.host):
+        token = "?token=<RIDETUNE_TOKEN>" if settings.token else ""
+        told = f"ridetune serves {address}/{token}"
+    else:
+        told = (
+            f"Open {link(address, store.browsers.make_link())}\n"
+            "This link lets one browser in, which then stays let in; for another: "
+            f"{link_command(settings)}"
+        )
+    print(f"{told}\nData are kept in {settings.data}.", flush=True)
 
 
 def _listen(settings: Settings) -> socket.socket:

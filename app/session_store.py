@@ -1,12 +1,9 @@
-"""Sessions: who they belong to, and the cars that are tuned in them."""
+"""Sessions and the cars that are tuned in them; whose they are is in `owner_store`."""
 
-import hashlib
-import hmac
 import json
 import secrets
 import time
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,11 +13,11 @@ from .database import Database
 from .errors import NotFound, Unavailable
 from .file_store import FileStore
 from .measurement_store import MeasurementStore, NewMeasurement
+from .secret import hashed, new_secret
 from .session_row import GONE
 from .settings import Limits
 from .tables import jobs, sessions
 
-SEEN_EVERY = 60.0
 UNUSED_AFTER = 3600.0
 
 
@@ -47,20 +44,25 @@ class SessionStore:
         self._limits = limits
         self._files = files
         self._measurements = measurements
-        self._seen: dict[str, float] = {}
 
     def create(
-        self, vehicle: Mapping[str, Any], samples: Sequence[NewMeasurement]
+        self,
+        vehicle: Mapping[str, Any],
+        samples: Sequence[NewMeasurement],
+        owner: str | None = None,
     ) -> tuple[str, str]:
-        """Id and token of a fresh session that holds a vehicle and sample measurements."""
-        session, token, now = secrets.token_hex(8), secrets.token_urlsafe(32), time.time()
+        """Id and token of a fresh session that holds a vehicle and sample measurements; the token
+        opens it where it has no owner.
+        """
+        session, token, now = secrets.token_hex(8), new_secret(), time.time()
         text = json.dumps(vehicle)
         with self._database.writing() as connection:
             self._make_room(connection, now)
             connection.execute(
                 insert(sessions).values(
                     id=session,
-                    token_hash=_hash(token),
+                    token_hash=hashed(token),
+                    owner=owner,
                     created=now,
                     seen=now,
                     vehicle=text,
@@ -84,22 +86,6 @@ class SessionStore:
                 "no longer needed, or try again later.",
                 retry_after=600,
             )
-
-    def holds(self, session: str, token: str) -> bool:
-        """Whether the token opens the session; notes that the session is in use."""
-        with self._database.reading() as connection:
-            kept = connection.execute(
-                select(sessions.c.token_hash).where(sessions.c.id == session)
-            ).scalar_one_or_none()
-        if kept is None or not hmac.compare_digest(kept, _hash(token)):
-            return False
-        now = time.time()
-        if now - self._seen.get(session, 0.0) > SEEN_EVERY:
-            self._seen[session] = now
-            # Where nothing can be written, what is kept may still be looked at.
-            with suppress(Unavailable):
-                self._set(session, seen=now)
-        return True
 
     def get(self, session: str) -> Session:
         """The workspace."""
@@ -138,8 +124,3 @@ class SessionStore:
             connection.execute(mine.with_for_update())
             connection.execute(delete(sessions).where(sessions.c.id == session))
         self._files.drop_unreferenced()
-        self._seen.pop(session, None)
-
-
-def _hash(token: str) -> str:
-    return hashlib.sha256(token.encode()).hexdigest()

@@ -1,14 +1,14 @@
 """What the service is told from outside: where its data lives, where it listens, how much it takes.
 
 Every setting has an environment variable: RIDETUNE_DATA, RIDETUNE_HOST, RIDETUNE_PORT,
-RIDETUNE_TOKEN, RIDETUNE_ALLOWED_HOSTS (comma separated), RIDETUNE_CLUSTER with
+RIDETUNE_LOGIN, RIDETUNE_TOKEN, RIDETUNE_PUBLIC_URL, RIDETUNE_PROXY_USER_HEADER,
+RIDETUNE_PROXY_ADDRESSES and RIDETUNE_ALLOWED_HOSTS (comma separated), RIDETUNE_CLUSTER with
 RIDETUNE_CLUSTER_CA, RIDETUNE_CLUSTER_CERT and RIDETUNE_CLUSTER_KEY, RIDETUNE_DATABASE,
 RIDETUNE_GRACE, RIDETUNE_NOTICE, RIDETUNE_LOG, RIDETUNE_LOG_LEVEL, and for each limit
 RIDETUNE_LIMIT_ followed by its name in capitals.
 """
 
 import dataclasses
-import ipaddress
 import math
 import os
 from collections.abc import Mapping
@@ -17,8 +17,10 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar
+from urllib.parse import urlsplit
 
 from . import logs
+from .addresses import Network, is_loopback, networks, origin, without_port
 from .errors import StartError
 
 LIMIT = "RIDETUNE_LIMIT_"
@@ -82,6 +84,10 @@ class Certificates:
 class Settings:
     """One service.
 
+    login : whether visitors must be let in; without it everybody on this machine is
+    token : lets in whoever brings it, as often as they like; empty for none
+    public_url : scheme, host and port of the proxy that visitors see; empty for none
+    proxy_user_header, proxy_addresses : where the proxy names the user, and who may say so
     cluster : empty for workers of its own, else a Dask scheduler's address
     certificates : what a scheduler at tls:// asks for
     database : empty for SQLite in the data directory, else a PostgreSQL URL
@@ -93,7 +99,11 @@ class Settings:
     data: Path
     host: str = "127.0.0.1"
     port: int = 8000
-    token: str = ""
+    login: bool = True
+    token: str = field(default="", repr=False)
+    public_url: str = ""
+    proxy_user_header: str = ""
+    proxy_addresses: tuple[Network, ...] = ()
     allowed_hosts: tuple[str, ...] = ()
     cluster: str = ""
     certificates: Certificates | None = None
@@ -111,16 +121,21 @@ class Settings:
         host: str | None = None,
         port: int | None = None,
         data: str | Path | None = None,
+        login: bool | None = None,
         environment: Mapping[str, str] = os.environ,
     ) -> "Settings":
         """Settings from the environment; an argument that is not None goes before it."""
         allowed = environment.get("RIDETUNE_ALLOWED_HOSTS", "")
         cluster = environment.get("RIDETUNE_CLUSTER", "")
         return cls(
-            data=Path(data or environment.get("RIDETUNE_DATA") or _default_data(environment)),
+            data=Path(data or environment.get("RIDETUNE_DATA") or usual_data(environment)),
             host=host or environment.get("RIDETUNE_HOST") or cls.host,
             port=_port(environment.get("RIDETUNE_PORT", cls.port) if port is None else port),
+            login=_login(environment.get("RIDETUNE_LOGIN", "on")) if login is None else login,
             token=environment.get("RIDETUNE_TOKEN", ""),
+            public_url=origin(environment.get("RIDETUNE_PUBLIC_URL", "")),
+            proxy_user_header=environment.get("RIDETUNE_PROXY_USER_HEADER", "").strip(),
+            proxy_addresses=networks(environment.get("RIDETUNE_PROXY_ADDRESSES", "")),
             allowed_hosts=tuple(name.strip() for name in allowed.split(",") if name.strip()),
             cluster=cluster,
             certificates=_certificates(cluster, environment),
@@ -132,32 +147,56 @@ class Settings:
             limits=_limits(environment),
         )
 
-    def check_bind(self) -> None:
-        """Refuse to be reachable from other machines without a token."""
-        if not self.token and not is_loopback(self.host):
+    def check_bind(self, *, keys: bool = False) -> None:
+        """Refuse ways in that contradict each other or open the service to other machines; `keys`
+        tells whether there are any.
+        """
+        if not self.login and (self.token or self.proxy_user_header or self.public_url):
+            raise StartError(
+                "Without login whoever reaches the service is let in, which goes neither with "
+                "RIDETUNE_TOKEN and RIDETUNE_PROXY_USER_HEADER nor with RIDETUNE_PUBLIC_URL; leave "
+                "those out, or the login on."
+            )
+        if bool(self.proxy_user_header) != bool(self.proxy_addresses):
+            raise StartError(
+                "RIDETUNE_PROXY_USER_HEADER, the header in which a proxy names the user, and "
+                "RIDETUNE_PROXY_ADDRESSES, from where it is believed, need each other; set both."
+            )
+        if is_loopback(self.host):
+            return
+        if not self.login:
+            raise StartError(
+                f"Listening on {self.host} without login would open the service to other machines; "
+                "leave the login on, or use --host 127.0.0.1."
+            )
+        if not (self.token or self.proxy_user_header or keys):
             raise StartError(
                 f"Listening on {self.host} would open the service to other machines; set "
-                "RIDETUNE_TOKEN to a secret that visitors must bring, or use --host 127.0.0.1."
+                "RIDETUNE_TOKEN to a secret that visitors must bring, make a key with `ridetune "
+                "keys add`, set up the login of a proxy, or use --host 127.0.0.1."
             )
+
+    @property
+    def https(self) -> bool:
+        """Whether visitors come by https, through a proxy."""
+        return self.public_url.startswith("https:")
 
     def host_names(self) -> frozenset[str]:
         """Names a request's Host header may carry, lower case and without port."""
         own = () if self.host in ("0.0.0.0", "::") else (self.host,)
-        names = ("localhost", "127.0.0.1", "[::1]", *own, *self.allowed_hosts)
+        public = (without_port(urlsplit(self.public_url).netloc),) if self.public_url else ()
+        names = ("localhost", "127.0.0.1", "[::1]", *own, *public, *self.allowed_hosts)
         return frozenset(name.lower() for name in names)
 
 
-def is_loopback(host: str) -> bool:
-    """Whether only this machine reaches the address."""
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
+def _login(text: str) -> bool:
+    if text not in ("on", "off"):
+        raise StartError(f"RIDETUNE_LOGIN is {text!r}; it is on, or off for everybody.")
+    return text == "on"
 
 
-def _default_data(environment: Mapping[str, str]) -> Path:
+def usual_data(environment: Mapping[str, str]) -> Path:
+    """Where everything is kept unless told otherwise."""
     shared = environment.get("XDG_DATA_HOME") or os.path.expanduser("~/.local/share")
     return Path(shared) / "ridetune"
 

@@ -11,13 +11,16 @@ from typing import Any
 
 from sqlalchemy import insert, select
 
-from .data_directory import DataDirectory
+from .browser_store import BrowserStore
+from .data_directory import DataDirectory, database_of
 from .database import Database
 from .errors import NotFound
 from .file_store import FileStore
 from .job_store import UNFINISHED, JobStore
+from .key_store import KeyStore
 from .mapping_store import MappingStore
 from .measurement_store import MeasurementStore
+from .owner_store import OwnerStore
 from .postgresql import PostgresqlDatabase
 from .session_store import SessionStore
 from .settings import Limits
@@ -47,6 +50,9 @@ class Store:
             self.database, self.directory, limits, self.files, self.jobs
         )
         self.sessions = SessionStore(self.database, limits, self.files, self.measurements)
+        self.owners = OwnerStore(self.database)
+        self.browsers = BrowserStore(self.database)
+        self.keys = KeyStore(self.database)
         if self.database.shared:
             self.directory.sweep(older=RESTING)
         else:
@@ -121,6 +127,11 @@ class Store:
         """Remove a job with its result, its file and its parts."""
         self.jobs.delete(session, job)
         self.files.drop_unreferenced()
+
+
+def database_beside(path: Path, url: str) -> Database:
+    """The database of a data directory, opened beside the service that uses both."""
+    return PostgresqlDatabase(url) if url else SqliteDatabase(database_of(path))
 
 
 def _open(path: Path) -> tuple[Database, DataDirectory]:

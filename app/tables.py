@@ -35,6 +35,11 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         "ALTER TABLE jobs ADD COLUMN cancel_asked BOOLEAN NOT NULL DEFAULT FALSE",
         "ALTER TABLE jobs ADD COLUMN priority INTEGER NOT NULL DEFAULT 0",
     ),
+    (
+        "ALTER TABLE sessions ADD COLUMN owner TEXT",
+        "CREATE INDEX sessions_of_owner ON sessions (owner)",
+        "CREATE INDEX sessions_by_token ON sessions (token_hash)",
+    ),
 )
 """What leads from each version of the schema, the first being 1, to the next."""
 
@@ -64,6 +69,32 @@ sessions = Table(
     Column("vehicle", Text, nullable=False),
     Column("baseline", Text, nullable=False),
     Column("setup", Text),
+    Column("owner", Text),  # null: whoever holds the token
+)
+
+links = Table(
+    "links",
+    metadata,
+    Column("hash", String(64), primary_key=True),
+    Column("expires", Float, nullable=False),
+)
+
+browsers = Table(
+    "browsers",
+    metadata,
+    Column("hash", String(64), primary_key=True),
+    Column("created", Float, nullable=False),
+    Column("expires", Float, nullable=False),
+)
+
+keys = Table(
+    "keys",
+    metadata,
+    Column("name", String(100), primary_key=True),
+    Column("hash", String(64), nullable=False, unique=True),
+    Column("begins", String(16), nullable=False),
+    Column("created", Float, nullable=False),
+    Column("used", Float),
 )
 
 uploads = Table(
@@ -146,6 +177,8 @@ job_parts = Table(
     Column("progress", Text, nullable=False, default="{}"),
 )
 
+Index("sessions_of_owner", sessions.c.owner)
+Index("sessions_by_token", sessions.c.token_hash)
 Index("measurements_of_session", measurements.c.session, measurements.c.created)
 Index("measurements_of_upload", measurements.c.sha256)
 Index("job_files_of_upload", job_files.c.sha256)

@@ -1,8 +1,9 @@
 """The 3D view: one viser server a session, shown through this service's own address.
 
-viser runs a websocket server of its own on a loopback port; nothing else of it is used. Its
-single-file page is served here with a bridge script in front of it, and only the websocket is
-passed on. So there is one origin and one port, and nobody gets at a car without its session.
+viser runs a websocket server of its own on a loopback port, which takes nobody but the relay here
+(viser_servers.py); nothing else of it is used. Its single-file page is served here with a bridge
+script in front of it, and only the websocket is passed on. So there is one origin and one port, and
+nobody gets at a car without its session.
 viser is imported with the first view: it takes longer to load than the rest of the service.
 """
 
@@ -27,6 +28,7 @@ from .buckets import Buckets
 from .errors import Busy, NotFound, Unavailable
 from .package_files import package_folder
 from .settings import Limits
+from .viser_servers import ADMISSION, closed_server
 
 FOG = (18, 22, 27)
 GROUND = (120, 124, 130)
@@ -36,6 +38,8 @@ UNWATCHED_SECONDS = 600.0
 """How long a viewer without a tab is kept."""
 BURST_SECONDS = 5
 """How long a browser may send as fast as it can, in what it may send a second."""
+LOOK_AGAIN_SECONDS = 10.0
+"""How often it is looked at anew whether an open view is still its viewer's."""
 EYE, TARGET = (3.3, -4.1, 1.45), (0.0, 0.0, 0.5)
 
 router = APIRouter()
@@ -46,11 +50,10 @@ class Viewer:
 
     def __init__(self):
         import rich
-        import viser
         from viser import _messages as messages
 
         rich.get_console().quiet = True
-        self.server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        self.server = closed_server()
         self.watchers = 0
         self.seen = time.monotonic()
         # Any tab could ask for a public tunnel to this server.
@@ -195,7 +198,7 @@ async def relay(websocket: WebSocket, sid: str) -> None:
         await _hang_up(websocket, 1013, str(refused))
         return
     try:
-        await _pass_on(websocket, viewer.address, viewers.limits)
+        await _pass_on(websocket, sid, viewer.address, viewers.limits)
     except Busy as flooded:
         await _hang_up(websocket, 1008, str(flooded))
     except (OSError, WebSocketException):
@@ -211,13 +214,16 @@ async def _hang_up(websocket: WebSocket, code: int, reason: str = "") -> None:
         await websocket.close(code, reason)
 
 
-async def _pass_on(websocket: WebSocket, address: str, limits: Limits) -> None:
-    """Carry messages both ways until either side hangs up, or the browser sends too many."""
+async def _pass_on(websocket: WebSocket, sid: str, address: str, limits: Limits) -> None:
+    """Carry messages both ways until either side hangs up, the session is theirs no more, or the
+    browser sends too many.
+    """
     rate = limits.viewer_messages
     messages = Buckets(rate, BURST_SECONDS * rate)
     offered = [p for p in websocket.scope["subprotocols"] if p.startswith("viser-v")][:1]
     async with connect(
         address,
+        additional_headers=ADMISSION,
         subprotocols=offered or None,
         compression=None,
         max_size=MESSAGE_BYTES,
@@ -228,6 +234,7 @@ async def _pass_on(websocket: WebSocket, address: str, limits: Limits) -> None:
         ways = [
             asyncio.create_task(_to_viser(websocket, upstream, messages)),
             asyncio.create_task(_to_browser(websocket, upstream)),
+            asyncio.create_task(_until_lost(websocket, sid)),
         ]
         try:
             await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
@@ -237,6 +244,15 @@ async def _pass_on(websocket: WebSocket, address: str, limits: Limits) -> None:
             ends = await asyncio.gather(*ways, return_exceptions=True)
         if isinstance(ends[0], Busy):
             raise ends[0]
+
+
+async def _until_lost(websocket: WebSocket, sid: str) -> None:
+    """Hang up once the session is the caller's no more: deleted, or their key removed."""
+    with suppress(NotFound):
+        while True:
+            await asyncio.sleep(LOOK_AGAIN_SECONDS)
+            await run_in_threadpool(session_of, websocket, sid)
+    await _hang_up(websocket, 1008)
 
 
 async def _to_viser(websocket: WebSocket, upstream: ClientConnection, messages: Buckets) -> None:

@@ -240,7 +240,7 @@ function lost(error) {
   if (!(error instanceof api.Refusal)) throw error;
   banner(`${error.message} `, "lost");
   $("#banner").append(Object.assign(document.createElement("a"),
-    { href: "/", textContent: "Begin a new session" }));
+    { href: "/", textContent: "Open the start page" }));
 }
 
 window.ridetune = {

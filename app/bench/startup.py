@@ -80,7 +80,8 @@ def _environment() -> dict[str, str]:
 def _until_answered() -> float:
     """Seconds of a service with a data folder of its own until the page is there."""
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-u", "-c", SERVE, "serve", "--port", "0", "--data", folder]
+        command = [sys.executable, "-u", "-c", SERVE, "serve", "--no-login"]
+        command += ["--port", "0", "--data", folder]
         began = time.perf_counter()
         with subprocess.Popen(
             command, env=_environment(), stdout=subprocess.PIPE, text=True

@@ -6,6 +6,7 @@ import json
 import logging
 import time
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -30,9 +31,11 @@ PATIENCE = 120.0
 """How long a job may take, s."""
 
 
-def open_client(settings: Settings, **options) -> TestClient:
-    """A client of a fresh service that takes the kernels as compiled; enter it to start."""
-    app = create_app(settings, warm_up=lambda warmup: None)
+def open_client(settings: Settings, *, login: bool = False, **options) -> TestClient:
+    """A client of a fresh service that takes the kernels as compiled, and lets everybody in unless
+    there is to be a `login`; enter it to start.
+    """
+    app = create_app(replace(settings, login=login), warm_up=lambda warmup: None)
     return TestClient(app, base_url=ADDRESS, **options)
 
 

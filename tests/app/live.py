@@ -14,7 +14,7 @@ from ridetune.app.serve import serve
 from ridetune.app.settings import Settings
 
 if __name__ == "__main__":
-    serve(Settings(data=Path(sys.argv[1]), port=0))
+    serve(Settings(data=Path(sys.argv[1]), port=0, login=False))
 """
 
 

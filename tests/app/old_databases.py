@@ -25,6 +25,7 @@ DDL: dict[str, list[tuple[int, str]]] = {
         (1, "vehicle TEXT NOT NULL"),
         (1, "baseline TEXT NOT NULL"),
         (6, "setup TEXT"),
+        (8, "owner TEXT"),
         (1, "PRIMARY KEY (id)"),
     ],
     "uploads": [
@@ -97,11 +98,32 @@ DDL: dict[str, list[tuple[int, str]]] = {
         (7, "job VARCHAR(32) NOT NULL"),
         (7, "name VARCHAR(200) NOT NULL"),
         (7, "sha256 VARCHAR(64) NOT NULL"),
+        (7, "progress TEXT NOT NULL"),
         (7, "PRIMARY KEY (job, name)"),
         (7, JOB),
         (7, UPLOAD),
     ],
     "database_identity": [(7, "id VARCHAR(32) NOT NULL")],
+    "links": [
+        (8, "hash VARCHAR(64) NOT NULL"),
+        (8, "expires FLOAT NOT NULL"),
+        (8, "PRIMARY KEY (hash)"),
+    ],
+    "browsers": [
+        (8, "hash VARCHAR(64) NOT NULL"),
+        (8, "created FLOAT NOT NULL"),
+        (8, "expires FLOAT NOT NULL"),
+        (8, "PRIMARY KEY (hash)"),
+    ],
+    "keys": [
+        (8, "name VARCHAR(100) NOT NULL"),
+        (8, "hash VARCHAR(64) NOT NULL"),
+        (8, "begins VARCHAR(16) NOT NULL"),
+        (8, "created FLOAT NOT NULL"),
+        (8, "used FLOAT"),
+        (8, "PRIMARY KEY (name)"),
+        (8, "UNIQUE (hash)"),
+    ],
 }
 INDICES = [
     (1, "jobs_by_state ON jobs (state)"),
@@ -110,6 +132,8 @@ INDICES = [
     (1, "measurements_of_upload ON measurements (sha256)"),
     (2, "job_files_of_upload ON job_files (sha256)"),
     (7, "job_parts_of_upload ON job_parts (sha256)"),
+    (8, "sessions_of_owner ON sessions (owner)"),
+    (8, "sessions_by_token ON sessions (token_hash)"),
 ]
 
 
@@ -178,6 +202,7 @@ def _all_rows(version: int) -> dict[str, list[dict[str, Any]]]:
                 "vehicle": car,
                 "baseline": car,
                 "setup": '{"starts": 8}',
+                "owner": None,
             }
         ],
         "uploads": [
@@ -210,6 +235,13 @@ def _all_rows(version: int) -> dict[str, list[dict[str, Any]]]:
         ],
         "results": [{"job": "done", "body": '{"cost": 1.5}'}],
         "job_files": [{"job": "done", "sha256": SHA256[1]}],
-        "job_parts": [{"job": "running", "name": "first", "sha256": SHA256[2]}],
+        "job_parts": [
+            {"job": "running", "name": "first", "sha256": SHA256[2], "progress": '{"cars": 9}'}
+        ],
         "database_identity": [{"id": "i" * 32}],
+        "links": [{"hash": "1" * 64, "expires": 2e9}],
+        "browsers": [{"hash": "2" * 64, "created": 1e9, "expires": 2e9}],
+        "keys": [
+            {"name": "ci", "hash": "3" * 64, "begins": "rt_abc", "created": 1e9, "used": None}
+        ],
     }

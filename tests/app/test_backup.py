@@ -112,7 +112,8 @@ def test_everything_comes_back(tmp_path, database, other_database, command, caps
     assert "2 sessions with 4 measurements and 6 jobs, 7 files" in capsys.readouterr().out
     store = Store(there, Limits(), other_database)
     assert picture(store, sessions) == before
-    assert all(map(store.sessions.holds, sessions, tokens))
+    for session, token in zip(sessions, tokens, strict=True):
+        assert store.owners.opens(session, user=None, token=token)
     assert len(set(store.directory.names())) == 7
     assert len(store.jobs.claim("me", 5)) == 2
     store.close()
@@ -361,7 +362,7 @@ def test_an_older_backup_is_brought_up_to_date(tmp_path, backup, command, versio
     changed(backup, older)
     command(database, "restore", backup, "--data", tmp_path / "there")
     store = Store(tmp_path / "there", Limits(), database)
-    assert store.sessions.holds("s1", TOKEN)
+    assert store.owners.opens("s1", user=None, token=TOKEN)
     [kept] = store.measurements.of_session("s1")
     assert store.measurements.original(kept).read_bytes() == FILES[0]
     assert store.jobs.get("s1", "done").result == {"cost": 1.5}

@@ -142,7 +142,7 @@ def test_serve_answers_until_interrupted(folder):
     environment = {name: value for name, value in os.environ.items() if "RIDETUNE" not in name}
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as service:
         try:
-            address = next(word for word in service.stdout.readline().split() if "http" in word)
+            address, _, _ = service.stdout.readline().removeprefix("Open ").partition("?")
             with urllib.request.urlopen(f"{address}healthz", timeout=30) as reply:
                 assert reply.status == 200
         finally:

@@ -58,7 +58,12 @@ def test_every_reply_forbids_foreign_scripts_and_guessing(client):
     for path in ("/", "/api/parameters", "/nowhere"):
         headers = client.get(path).headers
         assert "script-src 'self'" in headers["content-security-policy"]
+        assert "frame-ancestors 'none'" in headers["content-security-policy"]
         assert headers["x-content-type-options"] == "nosniff"
+        assert headers["cross-origin-opener-policy"] == "same-origin"
+        assert headers["cross-origin-resource-policy"] == "same-origin"
+        assert headers["referrer-policy"] == "same-origin"
+        assert "camera=()" in headers["permissions-policy"]
 
 
 def test_a_long_body_is_refused_with_its_limit(small_limits):

@@ -15,7 +15,7 @@ from ridetune.app.pool import Pool
 from ridetune.app.settings import Settings
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from .conftest import Visitor, open_client
+from .conftest import ADDRESS, Visitor, open_client
 from .loop import in_a_loop
 
 FORGED = "renamed to x\n2026-01-01T00:00:00.000Z ERROR ridetune: forged \x1b[31m"
@@ -162,7 +162,9 @@ def test_a_websocket_that_fails_is_closed_without_a_word_of_why(settings, lines)
     with open_client(settings) as client:
         client.app.include_router(broken_routes())
         with (
-            client.websocket_connect("ws://127.0.0.1:8000/broken") as socket,
+            client.websocket_connect(
+                "ws://127.0.0.1:8000/broken", headers={"Origin": ADDRESS}
+            ) as socket,
             pytest.raises(WebSocketDisconnect) as closed,
         ):
             socket.receive_text()

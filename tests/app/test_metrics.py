@@ -2,6 +2,7 @@
 
 import re
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from sqlalchemy import text
 from sqlalchemy.exc import OperationalError
 
 from .conftest import ADDRESS, Visitor, short_recording
+from .test_viewer import open_socket
 
 HERE = ("127.0.0.1", 50000)
 ELSEWHERE = ("192.0.2.7", 50000)
@@ -21,6 +23,7 @@ TABLE = Path(__file__).parents[2] / "docs" / "operations.md"
 
 
 def opened(settings: Settings, peer=HERE) -> TestClient:
+    settings = replace(settings, login=bool(settings.token))
     app = create_app(settings, warm_up=lambda warmup: None)
     return TestClient(app, base_url=ADDRESS, client=peer)
 
@@ -96,11 +99,8 @@ def test_work_of_the_pools_is_timed(client):
 
 def test_websockets_are_counted_while_they_are_open(client):
     visitor = Visitor(client)
-    bearer = {"Authorization": f"Bearer {visitor.token}"}
     before = value(samples(client), "websockets")
-    with client.websocket_connect(
-        f"ws://127.0.0.1:8000/s/{visitor.id}/viewer", headers={"Origin": ADDRESS} | bearer
-    ):
+    with open_socket(client, visitor):
         during = value(samples(client), "websockets")
     assert (before, during) == (0, 1)
     deadline = time.monotonic() + 30

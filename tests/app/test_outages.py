@@ -10,7 +10,7 @@ import pytest
 from ridetune.app.errors import Unavailable
 from ridetune.app.settings import Limits, Settings
 from ridetune.app.store import Store
-from sqlalchemy import event
+from sqlalchemy import event, text
 
 from .conftest import Visitor, open_client, short_recording
 
@@ -173,9 +173,10 @@ def test_an_sqlite_database_that_takes_nothing_can_be_looked_at(client, case):
     def hinder(connection, *_) -> None:
         connection.execute(f"PRAGMA {pragma}").close()
 
+    with store.database.writing() as connection:
+        connection.execute(text("UPDATE sessions SET seen = 0"))
     event.listen(pool, "checkout", hinder)
     refused(client.post("/api/sessions"), status, said)
-    store.sessions._seen.clear()
     assert owner.get("/vehicle").status_code == 200
     event.remove(pool, "checkout", hinder)
     pool.dispose()

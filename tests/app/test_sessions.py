@@ -222,7 +222,7 @@ def test_too_many_sessions_are_refused_with_a_sentence(small_limits):
 
 
 def test_a_service_with_a_token_gives_sessions_only_to_who_brings_it(tmp_path):
-    with open_client(Settings(data=tmp_path, token="open sesame")) as client:
+    with open_client(Settings(data=tmp_path, token="open sesame"), login=True) as client:
         assert client.post("/api/sessions").status_code == 403
         assert client.get("/", follow_redirects=False).status_code == 403
         allowed = client.post("/api/sessions", headers={"Authorization": "Bearer open sesame"})

@@ -1,10 +1,14 @@
-"""Settings come from the environment; a wrong one is a sentence, a public bind needs a token."""
+"""Settings come from the environment; a wrong one is a sentence, a public bind a way to get in."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from ridetune.app.addresses import is_loopback, networks
 from ridetune.app.errors import StartError
-from ridetune.app.settings import Certificates, Settings, is_loopback
+from ridetune.app.settings import Certificates, Settings
+
+PROXY = {"proxy_user_header": "X-Forwarded-User", "proxy_addresses": networks("10.0.0.1")}
 
 
 def test_an_argument_goes_before_the_environment_and_that_before_the_default():
@@ -32,6 +36,14 @@ def test_limits_are_set_one_by_one():
         ("RIDETUNE_LIMIT_SESSIONS", "-1"),
         ("RIDETUNE_LIMIT_SESSIONS", "2.5"),
         ("RIDETUNE_LIMIT_SIMULATED_SECONDS", "nan"),
+        ("RIDETUNE_LOGIN", "no"),
+        ("RIDETUNE_PUBLIC_URL", "ride.example.com"),
+        ("RIDETUNE_PUBLIC_URL", "https://"),
+        ("RIDETUNE_PUBLIC_URL", "https://ride.example.com/below"),
+        ("RIDETUNE_PUBLIC_URL", "https://ride.example.com:port"),
+        ("RIDETUNE_PUBLIC_URL", "ftp://ride.example.com"),
+        ("RIDETUNE_PROXY_ADDRESSES", "10.0.0.1/24"),
+        ("RIDETUNE_PROXY_ADDRESSES", "proxy"),
     ],
 )
 def test_a_value_out_of_range_is_named(name, value):
@@ -61,15 +73,56 @@ def test_a_misspelt_limit_is_refused_with_the_nearest():
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.2", "car.example"])
-def test_other_machines_need_a_token(host):
+def test_other_machines_need_a_token_a_key_or_a_proxy(host):
     assert not is_loopback(host)
+    settings = Settings(data=Path("x"), host=host)
     with pytest.raises(StartError, match="RIDETUNE_TOKEN"):
-        Settings(data=Path("x"), host=host).check_bind()
-    Settings(data=Path("x"), host=host, token="secret").check_bind()
+        settings.check_bind()
+    settings.check_bind(keys=True)
+    replace(settings, token="secret").check_bind()
+    replace(settings, **PROXY).check_bind()
+
+
+@pytest.mark.parametrize("ways", [{}, {"keys": True}])
+def test_no_other_machine_comes_without_login(ways):
+    with pytest.raises(StartError, match="without login"):
+        Settings(data=Path("x"), host="0.0.0.0", login=False).check_bind(**ways)
+
+
+@pytest.mark.parametrize(
+    ("told", "named"),
+    [
+        ({"login": False, "token": "secret"}, "RIDETUNE_TOKEN"),
+        ({"login": False} | PROXY, "RIDETUNE_PROXY_USER_HEADER"),
+        ({"login": False, "public_url": "https://ride.example.com"}, "RIDETUNE_PUBLIC_URL"),
+        ({"proxy_user_header": "X-Forwarded-User"}, "RIDETUNE_PROXY_ADDRESSES"),
+        ({"proxy_addresses": networks("10.0.0.1")}, "RIDETUNE_PROXY_USER_HEADER"),
+    ],
+)
+def test_ways_in_that_contradict_each_other_are_refused(told, named):
+    with pytest.raises(StartError, match=named):
+        Settings(data=Path("x"), **told).check_bind()
+
+
+@pytest.mark.parametrize(
+    ("url", "told"),
+    [
+        ("https://Ride.Example.com/", "https://ride.example.com"),
+        ("https://ride.example.com:443", "https://ride.example.com"),
+        ("http://ride.example.com:8080", "http://ride.example.com:8080"),
+        ("https://[2001:DB8::1]:8443", "https://[2001:db8::1]:8443"),
+    ],
+)
+def test_the_public_address_is_taken_as_browsers_write_it(url, told):
+    """Oracle: the origin of a page there, RFC 6454."""
+    settings = Settings.from_environment(data="x", environment={"RIDETUNE_PUBLIC_URL": url})
+    assert settings.public_url == told
+    assert settings.https == told.startswith("https:")
+    assert told.split("//")[1].removesuffix(":8080").removesuffix(":8443") in settings.host_names()
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.1.2.3", "::1", "localhost"])
-def test_this_machine_needs_none(host):
+def test_this_machine_needs_nothing_of_that(host):
     assert is_loopback(host)
     Settings(data=Path("x"), host=host).check_bind()
 

@@ -231,7 +231,7 @@ def test_what_one_service_keeps_the_other_finds(services):
     one, other = services
     session, token = one.sessions.create(CAR, [])
     kept = one.measurements.add(session, recording(b"0 1 2"))
-    assert other.sessions.holds(session, token)
+    assert other.owners.opens(session, user=None, token=token)
     assert other.measurements.original(kept).read_bytes() == b"0 1 2"
     job = queued(one, session)
     assert [found.id for found in one.jobs.claim("one", 1)] == [job]
@@ -241,7 +241,7 @@ def test_what_one_service_keeps_the_other_finds(services):
     other.delete_job(session, job)
     assert one.jobs.heartbeat("one").jobs == frozenset()
     other.sessions.delete(session)
-    assert not one.sessions.holds(session, token)
+    assert not one.owners.opens(session, user=None, token=token)
 
 
 def test_a_data_directory_belongs_to_one_database(tmp_path, on_postgresql, postgresql):

@@ -109,7 +109,7 @@ def test_everything_is_there_after_reopening(tmp_path, database):
     store.close()
 
     store = Store(tmp_path, Limits(), database)
-    assert store.sessions.holds(session, token)
+    assert store.owners.opens(session, user=None, token=token)
     assert store.sessions.get(session).vehicle == CAR
     assert [one.name for one in store.measurements.of_session(session)] == ["run.csv", "run.csv"]
     assert (
@@ -166,14 +166,6 @@ def test_uploads_and_deletions_of_the_same_bytes_at_once_never_lose_a_file(store
     assert store.measurements.of_session(session) == []
 
 
-def test_a_token_opens_its_own_session_only(store):
-    (first, first_token), (second, second_token) = (store.sessions.create(CAR, []) for _ in "ab")
-    assert store.sessions.holds(first, first_token)
-    assert not store.sessions.holds(first, second_token)
-    assert not store.sessions.holds(second, "")
-    assert not store.sessions.holds("nobody", first_token)
-
-
 def test_room_is_made_from_sessions_nobody_used(tmp_path, database, monkeypatch):
     """A session with something of its own stays; one that only looked goes after an hour."""
     store = Store(tmp_path, Limits(sessions=2), database)
@@ -183,8 +175,8 @@ def test_room_is_made_from_sessions_nobody_used(tmp_path, database, monkeypatch)
     now = time.time()
     monkeypatch.setattr("ridetune.app.session_store.time.time", lambda: now + 7200.0)
     store.sessions.create(CAR, [])
-    assert store.sessions.holds(used, used_token)
-    assert not store.sessions.holds(looked, looked_token)
+    assert store.owners.opens(used, user=None, token=used_token)
+    assert not store.owners.opens(looked, user=None, token=looked_token)
     store.close()
 
 

@@ -53,7 +53,7 @@ def test_a_database_of_an_earlier_version_keeps_every_row(tmp_path, old):
 def test_a_database_of_an_earlier_version_works_like_any_other(tmp_path, old):
     version, database, _ = old
     store = Store(tmp_path / "data", Limits(), database)
-    assert store.sessions.holds("s1", TOKEN)
+    assert store.owners.opens("s1", user=None, token=TOKEN)
     done = store.jobs.get("s1", "done")
     assert (done.result, done.restarts, done.priority) == ({"cost": 1.5}, 2, 0)
     [kept] = store.measurements.of_session("s1")

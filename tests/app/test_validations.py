@@ -113,6 +113,7 @@ def test_the_report_is_served_in_a_sandbox(engineer, done):
     assert "allow-same-origin" not in policy
     assert "connect-src" not in policy
     assert "default-src 'none'" in policy
+    assert reply.headers["cross-origin-opener-policy"] == "unsafe-none"
     assert reply.text.startswith("<!doctype html>")
 
 

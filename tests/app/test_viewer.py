@@ -2,16 +2,20 @@
 
 import time
 
+import httpx2
 import msgspec
 import pytest
 from ridetune.app import viewer
 from ridetune.app.errors import Busy, Unavailable
 from ridetune.app.settings import Limits
 from ridetune.app.viewer import Viewers
+from ridetune.app.viser_servers import ADMISSION, HEADER
 from ridetune.engine.vehicle_file import reference_vehicles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 from viser import __version__ as viser_version
 from viser import _messages as messages
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
 
 from .conftest import ADDRESS
 
@@ -89,6 +93,22 @@ def test_the_relay_brings_the_scene_to_the_browser(client, visitor, car):
     assert len(received) > 1000
 
 
+def read_on(socket):
+    while True:
+        socket.receive_bytes()
+
+
+def test_an_open_view_ends_with_the_session(client, visitor, monkeypatch):
+    """Whatever ends it: that it is deleted, or a key removed."""
+    monkeypatch.setattr(viewer, "LOOK_AGAIN_SECONDS", 0.05)
+    with open_socket(client, visitor) as socket:
+        assert socket.receive_bytes()
+        client.app.state.services.store.sessions.delete(visitor.id)
+        with pytest.raises(WebSocketDisconnect) as refused:
+            read_on(socket)
+    assert refused.value.code == 1008
+
+
 def test_a_client_of_another_version_is_told_so(client, visitor):
     with (
         open_socket(client, visitor, "viser-v0.0.1") as socket,
@@ -133,6 +153,37 @@ def test_each_session_has_a_viewer_of_its_own(viewers, car):
 
 def test_viewers_listen_on_loopback_only(viewers):
     assert viewers.start("a").server.get_host() == "127.0.0.1"
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {},
+        {"Origin": "http://evil.example"},
+        {"Origin": ADDRESS},
+        {HEADER: ""},
+        {HEADER: "guessed"},
+        ADMISSION | {HEADER.lower(): "twice"},
+    ],
+    ids=["a process", "a page elsewhere", "our own page", "nothing", "a guess", "two"],
+)
+def test_nobody_gets_past_the_relay_to_visers_own_port(viewers, car, headers):
+    """Neither a socket nor a page: whoever reaches the port must bring this process's secret."""
+    viewers.show("a", car)
+    address = viewers.start("a").address
+    with pytest.raises(InvalidStatus) as refused:
+        connect(address, subprotocols=[PROTOCOL], additional_headers=list(headers.items()))
+    assert refused.value.response.status_code == 403
+    page = httpx2.get(address.replace("ws", "http"), headers=list(headers.items()))
+    assert (page.status_code, page.content) == (403, b"")
+
+
+def test_the_relays_own_way_leads_to_the_scene(viewers, car):
+    """Oracle of the refusals: the same connection with the secret is answered."""
+    viewers.show("a", car)
+    address = viewers.start("a").address
+    with connect(address, subprotocols=[PROTOCOL], additional_headers=ADMISSION) as socket:
+        assert len(socket.recv(timeout=30)) > 1000
 
 
 def test_no_tab_can_open_a_tunnel_to_the_world(viewers):

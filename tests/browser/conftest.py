@@ -34,6 +34,7 @@ ARGUMENTS = [
     "--ignore-gpu-blocklist",
     "--disable-accelerated-2d-canvas",
 ]
+PROGRAM = [sys.executable, "-c", "from ridetune.app.cli import main; raise SystemExit(main())"]
 SAMPLES = Path(__file__).parents[2] / "sample_runs"
 PATIENCE = 60.0
 AWAY = (
@@ -49,12 +50,16 @@ NOISE = re.compile(r"THREE\.Clock|GPU stall|WebGL.*software|swiftshader", re.IGN
 
 
 class Service:
-    """`ridetune serve` as a process of its own, with settings from the environment."""
+    """`ridetune serve` as a process of its own, which lets everybody in unless there is a `login`.
 
-    def __init__(self, data: Path, port: int = 0, **environment: str):
+    link : what lets one browser in then
+    environment : further settings
+    """
+
+    def __init__(self, data: Path, port: int = 0, *, login: bool = False, **environment: str):
         self.data = data
-        code = "from ridetune.app.cli import main; raise SystemExit(main())"
-        command = [sys.executable, "-c", code, "serve", "--data", str(data), "--port", str(port)]
+        command = [*PROGRAM, "serve", "--data", str(data), "--port", str(port)]
+        command += [] if login else ["--no-login"]
         self.log = (data.parent / f"{data.name}.log").open("ab")
         self.process = subprocess.Popen(
             command,
@@ -69,6 +74,7 @@ class Service:
         assert found, f"the service did not start: {line or Path(self.log.name).read_text()}"
         self.port = int(found[1])
         self.address = found[0]
+        self.link = line.split()[1]
         self._wait_until_ready()
 
     def _wait_until_ready(self) -> None:

@@ -1,0 +1,66 @@
+"""Addresses, as settings and requests tell them."""
+
+import ipaddress
+from contextlib import suppress
+from urllib.parse import urlsplit
+
+from .errors import StartError
+
+Network = ipaddress.IPv4Network | ipaddress.IPv6Network
+
+USUAL_PORTS = {"http": 80, "https": 443}
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine reaches the address."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def without_port(host: str) -> str:
+    """The name in a Host header."""
+    name, colon, port = host.rpartition(":")
+    return name if colon and port.isdigit() else host
+
+
+def origin(url: str) -> str:
+    """Scheme, host and port of RIDETUNE_PUBLIC_URL, as browsers write them."""
+    if not url:
+        return ""
+    with suppress(ValueError):
+        parts = urlsplit(url.strip().lower())
+        usual, more = USUAL_PORTS.get(parts.scheme), parts.path.strip("/") + parts.query
+        if usual and parts.hostname and not more:
+            host = f"[{parts.hostname}]" if ":" in parts.hostname else parts.hostname
+            port = "" if parts.port in (None, usual) else f":{parts.port}"
+            return f"{parts.scheme}://{host}{port}"
+    raise StartError(
+        f"RIDETUNE_PUBLIC_URL is {url!r}; give scheme and host of the whole service, such as "
+        "https://ride.example.com."
+    )
+
+
+def networks(text: str) -> tuple[Network, ...]:
+    """What RIDETUNE_PROXY_ADDRESSES lists: addresses and networks, by commas."""
+    stated = [part.strip() for part in text.split(",") if part.strip()]
+    try:
+        return tuple(ipaddress.ip_network(part) for part in stated)
+    except ValueError as error:
+        raise StartError(
+            f"RIDETUNE_PROXY_ADDRESSES: {error}; list addresses or networks such as 10.0.0.0/24."
+        ) from None
+
+
+def is_in(address: str, listed: tuple[Network, ...]) -> bool:
+    """Whether an address is one of those listed."""
+    try:
+        found = ipaddress.ip_address(address)
+    except ValueError:
+        return False
+    if isinstance(found, ipaddress.IPv6Address) and found.ipv4_mapped:
+        found = found.ipv4_mapped
+    return any(found in network for network in listed)

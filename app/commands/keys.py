@@ -1,0 +1,39 @@
+"""`ridetune keys`: the API keys with which programs use the service."""
+
+import sys
+from argparse import Namespace
+from collections.abc import Sequence
+from datetime import datetime
+
+from ..key_store import Key, KeyStore
+from ..settings import Settings
+from .kept import kept
+from .output import print_table
+
+
+def keys(options: Namespace) -> None:
+    """Add a key, list what is known of all, or end one."""
+    settings = Settings.from_environment(data=options.data)
+    with kept(settings, new=options.action == "add") as database:
+        store = KeyStore(database)
+        if options.action == "add":
+            print(store.add(options.name))
+            print("It is shown this once; send it as Authorization: Bearer ...", file=sys.stderr)
+        elif options.action == "remove":
+            store.remove(options.name)
+            print(f"The key {options.name!r} is ended; its sessions wait for a key of that name.")
+        elif known := store.list():
+            _print(known)
+        else:
+            print("There is no key yet; `ridetune keys add NAME` makes one.")
+
+
+def _print(known: Sequence[Key]) -> None:
+    rows = (
+        (key.name, f"{key.begins}...", _minute(key.created), _minute(key.used)) for key in known
+    )
+    print_table([("name", "key", "made", "used last"), *rows])
+
+
+def _minute(time: float | None) -> str:
+    return "never" if time is None else f"{datetime.fromtimestamp(time):%Y-%m-%d %H:%M}"

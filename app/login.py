@@ -1,0 +1,70 @@
+"""Who may use the service, apart from whose a session is (access.py).
+
+It is whoever brings an API key or the service's token as a bearer, a user whom the proxy names, and
+a browser that was let in once: by a link that is good for one browser, or by the service's token in
+the address. Keys and the proxy tell who it is; their sessions belong to that user.
+"""
+
+import hmac
+
+from fastapi import Response
+from starlette.requests import HTTPConnection
+
+from . import cookies
+from .errors import Forbidden
+from .origins import bearer
+from .proxy_login import proxy_user
+from .services import services_of
+
+
+def user_of(connection: HTTPConnection) -> str | None:
+    """Who calls, where that is known: `key:` or `user:` and a name."""
+    services = services_of(connection)
+    if (key := services.store.keys.name_of(bearer(connection.headers))) is not None:
+        return f"key:{key}"
+    named = proxy_user(connection.scope, services.settings)
+    return None if named is None else f"user:{named}"
+
+
+def is_let_in(connection: HTTPConnection) -> bool:
+    """Whether the caller may use the service and begin sessions."""
+    services = services_of(connection)
+    if not services.settings.login or user_of(connection) is not None:
+        return True
+    if brought := bearer(connection.headers):
+        return _is_service_token(connection, brought)
+    secret = cookies.access_secret(connection)
+    return bool(secret) and services.store.browsers.knows(secret)
+
+
+def brings_secret(connection: HTTPConnection) -> bool:
+    """Whether the caller's bearer is an API key or the service's token, as a program's is."""
+    brought = bearer(connection.headers)
+    known = services_of(connection).store.keys.name_of(brought) is not None
+    return known or _is_service_token(connection, brought)
+
+
+def require_let_in(connection: HTTPConnection) -> None:
+    """Refuse who may not use the service."""
+    if not is_let_in(connection):
+        raise Forbidden(
+            "This service asks who you are; open the link that `ridetune link` prints, or send a "
+            "key of `ridetune keys add` or the service's token as a bearer."
+        )
+
+
+def let_in(connection: HTTPConnection, response: Response, token: str) -> bool:
+    """Let the browser in if its address holds the service's token or a link's, which is used up."""
+    browsers = services_of(connection).store.browsers
+    if not (_is_service_token(connection, token) or browsers.use_link(token)):
+        return False
+    if not is_let_in(connection):
+        cookies.give_access(connection, response, browsers.let_in())
+    return True
+
+
+def _is_service_token(connection: HTTPConnection, brought: str) -> bool:
+    expected = services_of(connection).settings.token
+    return bool(expected) and hmac.compare_digest(
+        brought.encode(errors="replace"), expected.encode(errors="replace")
+    )
