@@ -90,7 +90,7 @@ def command_line() -> Parser:
     takes.validate(add("validate", _validate, "Identify a car and report what it predicts."))
     takes.advise(add("advise", _advise, "Tell which manoeuvre to drive next."))
     takes.campaign(add("campaign", _campaign, "Measure a car that is known, as files."))
-    takes.bench(add("bench", _bench, "Measure the engine and its peers on this machine."))
+    takes.bench(add("bench", _bench, "Measure the engine and its peers, or the service."))
     return parser
 
 

@@ -51,7 +51,8 @@ from .warmup import WarmUp, ready_to_simulate
 
 log = logging.getLogger(__name__)
 
-REAP_EVERY = 60.0
+REAPS = 10
+"""How often, while a viewer without a tab is kept, those that are due are looked for."""
 
 
 def create_app(
@@ -68,7 +69,7 @@ def create_app(
         app.state.services = services
         services.warmup.start()
         services.jobs.start(asyncio.get_running_loop())
-        reaper = asyncio.create_task(_reap(services.viewers))
+        reaper = asyncio.create_task(_reap(services))
         try:
             yield
         finally:
@@ -138,7 +139,7 @@ def _services(
             ready=warmup.wait,
         ),
         warmup=warmup,
-        viewers=_viewers(),
+        viewers=_viewers(settings.limits),
     )
 
 
@@ -168,12 +169,12 @@ def readers(limits: Limits) -> Pool:
     )
 
 
-def _viewers() -> Viewers | None:
+def _viewers(limits: Limits) -> Viewers | None:
     if not find_spec(".viewer", __package__):
         return None
     from .viewer import Viewers as Scenes
 
-    return Scenes()
+    return Scenes(limits.unwatched_seconds)
 
 
 def _close(services: Services) -> None:
@@ -186,8 +187,8 @@ def _close(services: Services) -> None:
     services.store.close()
 
 
-async def _reap(viewers: Viewers | None) -> None:
-    while viewers is not None:
-        await asyncio.sleep(REAP_EVERY)
+async def _reap(services: Services) -> None:
+    while services.viewers is not None:
+        await asyncio.sleep(services.settings.limits.unwatched_seconds / REAPS)
         with contextlib.suppress(Exception):
-            await asyncio.to_thread(viewers.reap)
+            await asyncio.to_thread(services.viewers.reap)

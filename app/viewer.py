@@ -30,8 +30,6 @@ FOG = (18, 22, 27)
 GROUND = (120, 124, 130)
 """Colour of the light from below."""
 MESSAGE_BYTES = 64 << 20
-UNWATCHED_SECONDS = 600.0
-"""How long a viewer without a tab is kept."""
 EYE, TARGET = (3.3, -4.1, 1.45), (0.0, 0.0, 0.5)
 
 router = APIRouter()
@@ -73,7 +71,9 @@ class Viewer:
 class Viewers:
     """The viewers of all sessions; every method may be called from any thread."""
 
-    def __init__(self):
+    def __init__(self, unwatched_seconds: float):
+        """unwatched_seconds : how long a viewer without a tab is kept."""
+        self._unwatched_seconds = unwatched_seconds
         self._viewers: dict[str, Viewer] = {}
         self._lock = threading.Lock()
 
@@ -110,7 +110,7 @@ class Viewers:
 
     def reap(self) -> None:
         """Stop the viewers that nobody has watched for a while; a returning tab starts anew."""
-        late = time.monotonic() - UNWATCHED_SECONDS
+        late = time.monotonic() - self._unwatched_seconds
         with self._lock:
             idle = [sid for sid, v in self._viewers.items() if v.watchers <= 0 and v.seen < late]
         for sid in idle:

@@ -3,8 +3,8 @@
 import time
 
 import pytest
-from ridetune.app import viewer
-from ridetune.app.viewer import Viewers
+from ridetune.app.settings import Limits
+from ridetune.app.viewer import Viewers, relay
 from ridetune.engine.vehicle_file import reference_vehicles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 from viser import __version__ as viser_version
@@ -18,7 +18,7 @@ SOCKETS = ADDRESS.replace("http", "ws")
 
 @pytest.fixture
 def viewers():
-    viewers = Viewers()
+    viewers = Viewers(Limits().unwatched_seconds)
     yield viewers
     viewers.close()
 
@@ -116,7 +116,7 @@ def test_a_tab_that_is_gone_before_it_is_answered_is_no_error(client, visitor, t
         sent.append(message["type"])
         raise OSError
 
-    client.portal.call(viewer.relay, WebSocket(scope, receive, send), visitor.id)
+    client.portal.call(relay, WebSocket(scope, receive, send), visitor.id)
     assert sent == [*(["websocket.accept"] if token == "its own" else []), "websocket.close"]
     assert client.app.state.services.viewers.start(visitor.id).watchers == 0
 
@@ -137,14 +137,17 @@ def test_no_tab_can_open_a_tunnel_to_the_world(viewers):
     assert messages.ShareUrlRequest not in handlers
 
 
-def test_only_unwatched_viewers_are_reaped(viewers, monkeypatch):
-    monkeypatch.setattr(viewer, "UNWATCHED_SECONDS", 0.0)
-    viewers.watch("watched", 1)
-    gone = viewers.start("gone")
-    time.sleep(0.01)
-    viewers.reap()
-    assert viewers.start("gone") is not gone
-    assert viewers.start("watched").watchers == 1
+def test_only_unwatched_viewers_are_reaped():
+    viewers = Viewers(unwatched_seconds=1e-6)
+    try:
+        viewers.watch("watched", 1)
+        gone = viewers.start("gone")
+        time.sleep(0.01)
+        viewers.reap()
+        assert viewers.start("gone") is not gone
+        assert viewers.start("watched").watchers == 1
+    finally:
+        viewers.close()
 
 
 def test_stopping_what_is_not_there_is_nothing(viewers):
