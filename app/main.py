@@ -33,6 +33,7 @@ from .cluster import Cluster
 from .guard import Guard
 from .identification_job import KIND as IDENTIFICATION
 from .identification_job import identify_runs, of_recordings
+from .interface import describe, operation_id
 from .jobs import Jobs
 from .package_files import package_folder
 from .pool import Pool
@@ -86,6 +87,7 @@ def create_app(
         redoc_url=None,
         # Else a DELETE below something whose name is empty would be sent on to that itself.
         redirect_slashes=False,
+        generate_unique_id_function=operation_id,
         lifespan=lifespan,
     )
     for part in (
@@ -109,6 +111,7 @@ def create_app(
 
         app.include_router(router)
     app.mount("/static", StaticFiles(directory=package_folder("static")))
+    app.openapi = describe(app)
     reply_to_errors(app)
     app.add_middleware(Guard, settings=settings)
     return app
