@@ -62,6 +62,13 @@ class Guard:
         if reason := refusal(scope, self.hosts):
             await problem(403, "forbidden", reason)(scope, receive, send)
             return
+        if Headers(scope=scope).get("content-encoding", "identity").lower() != "identity":
+            # A kilobyte might become a gigabyte.
+            packed = "The body is packed, as its Content-Encoding says; send it as it is."
+            accepted = {"Accept-Encoding": "identity"}
+            reply = problem(415, "unsupported-media-type", packed, headers=accepted)
+            await reply(scope, receive, send)
+            return
         limit = self._body_limit(scope)
         too_large = (
             f"The body is over the limit of {limit / 1e6:.3g} MB; send a smaller one, "
@@ -84,7 +91,8 @@ class Guard:
 def refusal(scope: Scope, hosts: frozenset[str]) -> str | None:
     """Why a request may not come in, or None."""
     headers = Headers(scope=scope)
-    host = headers.get("host", "").lower()
+    # Of two it is not known which one is meant.
+    host = ",".join(headers.getlist("host")).lower()
     if _without_port(host) not in hosts:
         return (
             "This service does not answer to that host name; use its own address, or add the name "
