@@ -9,7 +9,6 @@ import time
 import zlib
 
 import pytest
-from ridetune.app import store
 from ridetune.app.settings import Settings
 
 from .conftest import Visitor, open_client, short_recording
@@ -227,12 +226,13 @@ def test_gaps_of_a_recording_are_null_in_json(visitor):
     visitor.delete(path)
 
 
-def test_a_clock_that_jumps_ends_no_session(visitor, monkeypatch):
-    """An hour back and two days on; a session in use is neither forgotten nor made room of."""
-    wall = time.time
-    kept = visitor.upload(short_recording()).json()["id"]
-    for shift in (-3600.0, 2 * 86_400.0):
-        monkeypatch.setattr(store.time, "time", lambda: wall() + shift)
+def test_a_clock_that_jumps_changes_no_order_and_ends_no_session(visitor, monkeypatch):
+    """An hour back, then two days on: what came later is later, and every session stays."""
+    wall, kept = time.time, []
+    for shift in (0.0, -3600.0, 2 * 86_400.0):
+        monkeypatch.setattr(time, "time", lambda: wall() + shift)
         assert Visitor(visitor.client).get().status_code == 200
-        assert visitor.get(f"/measurements/{kept}").status_code == 200
-    visitor.delete(f"/measurements/{kept}")
+        kept.append(visitor.upload(short_recording()).json()["id"])
+    assert [one["id"] for one in visitor.get("/measurements").json()][-3:] == kept
+    for one in kept:
+        visitor.delete(f"/measurements/{one}")
