@@ -26,18 +26,18 @@ PROBLEMS = {
     422: "A field is missing, unknown or out of range, or the engine refuses what is said.",
     429: "Too much of the session's is under way, or kept; Retry-After may say when to try again.",
     503: "The service cannot do this just now; Retry-After says when to try again.",
+    507: "The disk of the service is full; nothing was kept.",
 }
 
 METHODS = ("get", "put", "post", "patch", "delete")
-SESSION = "/api/sessions/{sid}"
-KEPT_BUSY = (429, 503)
-READING = (409, 410, *KEPT_BUSY)
+SESSIONS = "/api/sessions"
+SESSION = f"{SESSIONS}/{{sid}}"
+READING = (409, 410, 429)
 
 ALSO: dict[str, tuple[int, ...]] = {
-    "sessions_create": (503,),
     "simulations_simulate": (406, *READING),
     "advice_advise": READING,
-    "measurements_upload": KEPT_BUSY,
+    "measurements_upload": (429,),
     "measurements_histories": (406, *READING),
     "measurements_as_csv": READING,
     "measurements_its_notes": READING,
@@ -114,19 +114,19 @@ def _completed(document: dict[str, Any]) -> dict[str, Any]:
             "description": "RIDETUNE_TOKEN, where the service has one.",
         },
     }
-    for path, operation in _operations(document):
-        _complete(path, operation)
+    for path, method, operation in _operations(document):
+        _complete(path, method, operation)
     return document
 
 
-def _operations(document: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+def _operations(document: Mapping[str, Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
     for path, methods in document["paths"].items():
         for method in METHODS:
             if method in methods:
-                yield path, methods[method]
+                yield path, method, methods[method]
 
 
-def _complete(path: str, operation: dict[str, Any]) -> None:
+def _complete(path: str, method: str, operation: dict[str, Any]) -> None:
     name, replies = operation["operationId"], operation["responses"]
     replies.pop("422", None)
     [done] = [status for status in replies if status.startswith("2")]
@@ -138,7 +138,7 @@ def _complete(path: str, operation: dict[str, Any]) -> None:
         replies[done]["content"]["application/json"] = {
             "schema": {"type": "array", "items": one} if many else one
         }
-    for status in sorted(_problems(path, operation)):
+    for status in sorted(_problems(path, method, operation)):
         replies[str(status)] = {"$ref": f"#/components/responses/Problem{status}"}
     body = operation.get("requestBody", {}).get("content", {}).get("application/json")
     if body is not None and name in EXAMPLES:
@@ -149,9 +149,12 @@ def _complete(path: str, operation: dict[str, Any]) -> None:
         operation["security"] = [{}, {"service": []}]
 
 
-def _problems(path: str, operation: Mapping[str, Any]) -> set[int]:
+def _problems(path: str, method: str, operation: Mapping[str, Any]) -> set[int]:
     """Statuses of problems that a route may answer with."""
     found = {403, *ALSO.get(operation["operationId"], ())}
+    if path.startswith(SESSIONS):
+        # The database may be out of reach.
+        found |= {503} if method == "get" else {503, 507}
     if "{" in path:
         found.add(404)
     if operation.get("parameters"):
