@@ -101,7 +101,9 @@ class Service:
     def left_behind(self) -> list[str]:
         """Files that nobody needs any more: halves of originals, what was being read."""
         found = [str(path) for path in self.data.rglob("*.tmp")]
-        found += [str(path) for path in (self.data / "reading").glob("*")]
+        if not self._database:
+            # Those who share a directory leave alone what another may be reading, for a while.
+            found += [str(path) for path in (self.data / "reading").glob("*")]
         return found
 
 

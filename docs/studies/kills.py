@@ -29,7 +29,8 @@ from killed_service import Cluster, Service
 from writing_clients import KINDS, Client, Ledger, Reference, outcome
 
 CLIENTS = 3
-ENDING_SECONDS = 240.0
+STILL_SECONDS = 120.0
+"""Time in which no job may change for those that have not ended to count as stuck, s."""
 STRAY_SECONDS = 10.0
 
 
@@ -98,8 +99,9 @@ def _tried(
     for client in clients:
         client.join()
     began = time.monotonic()
-    missing, wrong, stuck, states = _compared(service, ledger, reference)
+    _settle(service, ledger)
     settled = time.monotonic() - began
+    missing, wrong, stuck, states = _compared(service, ledger, reference)
     left = service.left_behind()
     before = service.tree()
     service.stop()
@@ -125,6 +127,23 @@ def _tried(
     return int(bool(findings))
 
 
+def _settle(service: Service, ledger: Ledger) -> None:
+    """Wait until every job has ended, or nothing has changed for long."""
+    seen, changed = "", time.monotonic()
+    while time.monotonic() - changed < STILL_SECONDS:
+        now = [
+            (job["id"], job["state"], job["progress"])
+            for session in ledger.sessions
+            for kind in {kind for kind, _ in session.jobs}
+            for job in session.request(service, "GET", f"/{KINDS[kind].place}").json()
+        ]
+        if not any(state in ("queued", "running") for _, state, _ in now):
+            return
+        if str(now) != seen:
+            seen, changed = str(now), time.monotonic()
+        time.sleep(1.0)
+
+
 def _compared(
     service: Service, ledger: Ledger, reference: Reference
 ) -> tuple[list[str], list[str], list[str], Counter[str]]:
@@ -133,7 +152,6 @@ def _compared(
     wrong: list[str] = []
     stuck: list[str] = []
     states: Counter[str] = Counter()
-    deadline = time.monotonic() + ENDING_SECONDS
     for session in ledger.sessions:
         if session.request(service, "GET").status_code != 200:
             missing.append(f"session {session.id}")
@@ -149,14 +167,7 @@ def _compared(
             wrong.append(f"car of {session.id}: {name}, not {session.cars}")
         for (kind, job), _ in session.jobs.items():
             path = f"/{KINDS[kind].place}/{job}"
-            while True:
-                reply = session.request(service, "GET", path)
-                if reply.status_code != 200 or reply.json()["state"] not in ("queued", "running"):
-                    break
-                if time.monotonic() > deadline:
-                    stuck.append(f"{kind} {job}: {reply.json()['state']}")
-                    break
-                time.sleep(0.1)
+            reply = session.request(service, "GET", path)
             if reply.status_code != 200:
                 missing.append(f"{kind} {job}: {reply.status_code}")
                 continue
@@ -164,7 +175,9 @@ def _compared(
             states[found["state"]] += 1
             if found["state"] == "done":
                 wrong += reference.differences(kind, job, outcome(service, session, kind, found))
-            elif found["state"] not in ("queued", "running"):
+            elif found["state"] in ("queued", "running"):
+                stuck.append(f"{kind} {job}: {found['state']}")
+            else:
                 wrong.append(f"{kind} {job}: {found['state']}, {found['error']}")
     return missing, wrong, stuck, states
 
