@@ -94,7 +94,7 @@ def command_line() -> Parser:
     takes.campaign(add("campaign", _campaign, "Measure a car that is known, as files."))
     takes.backup(add("backup", _backup, "Copy everything that a service keeps into one file."))
     takes.restore(add("restore", _restore, "Restore a backup into an empty directory."))
-    takes.bench(add("bench", _bench, "Measure the engine and its peers on this machine."))
+    takes.bench(add("bench", _bench, "Measure the engine and its peers, or the service."))
     return parser
 
 

@@ -258,6 +258,11 @@ def campaign(command: Parser) -> None:
 
 def bench(command: Parser) -> None:
     command.add_argument(
+        "--service",
+        action="store_true",
+        help="a service under load in place of the engine: what its users wait for, what they cost",
+    )
+    command.add_argument(
         "--only", metavar="NAME", nargs="+", action="extend", default=[], help="these rows alone"
     )
     command.add_argument(

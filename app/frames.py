@@ -126,10 +126,18 @@ def _extremes(
 
 def to_binary(head: Mapping[str, Any], frames: Frames) -> bytes:
     """The binary form; `samples`, `channels` and `decimation` are put into the head."""
-    text = json.dumps(clean(_complete(head, frames)), separators=(",", ":")).encode()
+    text = _text(_complete(head, frames)).encode()
     text += b" " * (-len(text) % 4)
     arrays = [values.astype("<f4").tobytes() for values in frames.columns.values()]
     return b"".join([struct.pack("<I", len(text)), text, *arrays])
+
+
+def _text(head: Mapping[str, Any]) -> str:
+    """As JSON; numbers that it lacks are rare, and to look for them takes longer than to write."""
+    try:
+        return json.dumps(head, separators=(",", ":"), allow_nan=False)
+    except ValueError:
+        return json.dumps(clean(head), separators=(",", ":"))
 
 
 def to_json(head: Mapping[str, Any], frames: Frames) -> dict[str, Any]:

@@ -73,6 +73,13 @@ class Guard:
         if "\0" in scope["path"]:  # which a database may refuse to look for
             await problem(404, "not-found", "No address has a NUL.")(scope, receive, send)
             return
+        if Headers(scope=scope).get("content-encoding", "identity").lower() != "identity":
+            # A kilobyte might become a gigabyte.
+            packed = "The body is packed, as its Content-Encoding says; send it as it is."
+            accepted = {"Accept-Encoding": "identity"}
+            reply = problem(415, "unsupported-media-type", packed, headers=accepted)
+            await reply(scope, receive, send)
+            return
         limit = self._body_limit(scope)
         too_large = (
             f"The body is over the limit of {limit / 1e6:.3g} MB; send a smaller one, "

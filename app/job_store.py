@@ -113,7 +113,8 @@ class JobStore:
             if (known := _known(connection, session, key, spec["asked"])) is not None:
                 return known, False
             mine = jobs.c.session == session
-            total = connection.execute(select(func.count()).where(mine)).scalar_one()
+            known_so_far = select(func.count(), func.max(jobs.c.created), self._database.now)
+            total, newest, now = connection.execute(known_so_far.where(mine)).one()
             unfinished = connection.execute(
                 select(func.count()).where(mine, jobs.c.state.in_(UNFINISHED))
             ).scalar_one()
@@ -134,7 +135,8 @@ class JobStore:
                     key=key,
                     state="queued",
                     spec=json.dumps(dict(spec)),
-                    created=self._database.now,
+                    # Also where the clock has gone back, what comes later is later.
+                    created=max(now, (newest or 0.0) + 1e-3),
                     priority=priority,
                 )
             )

@@ -39,6 +39,7 @@ from .guard import Guard
 from .heartbeat import beat
 from .identification_job import KIND as IDENTIFICATION
 from .identification_job import identify_runs, of_recordings
+from .interface import describe, operation_id
 from .jobs import Jobs
 from .metrics import Metrics
 from .observed import Observed
@@ -61,7 +62,8 @@ from .warmup import WarmUp, ready_to_simulate
 
 log = logging.getLogger(__name__)
 
-REAP_EVERY = 60.0
+REAPS = 10
+"""How often, while a viewer without a tab is kept, those that are due are looked for."""
 
 
 def create_app(
@@ -83,7 +85,7 @@ def create_app(
         collector = ServicesCollector(services)
         metrics.registry.register(collector)
         own = [
-            asyncio.create_task(_reap(services.viewers)),
+            asyncio.create_task(_reap(services)),
             asyncio.create_task(beat(metrics.lag.observe)),
         ]
         try:
@@ -104,6 +106,7 @@ def create_app(
         redoc_url=None,
         # Else a DELETE below something whose name is empty would be sent on to that itself.
         redirect_slashes=False,
+        generate_unique_id_function=operation_id,
         lifespan=lifespan,
     )
     for part in (
@@ -129,6 +132,7 @@ def create_app(
 
         app.include_router(router)
     app.mount("/static", StaticFiles(directory=package_folder("static")))
+    app.openapi = describe(app)
     reply_to_errors(app)
     # The last one is the outermost.
     app.add_middleware(Unexpected)
@@ -229,8 +233,8 @@ def _close(services: Services) -> None:
         last_first.callback(services.warmup.close)
 
 
-async def _reap(viewers: Viewers | None) -> None:
-    while viewers is not None:
-        await asyncio.sleep(REAP_EVERY)
+async def _reap(services: Services) -> None:
+    while services.viewers is not None:
+        await asyncio.sleep(services.settings.limits.unwatched_seconds / REAPS)
         with contextlib.suppress(Exception):
-            await asyncio.to_thread(viewers.reap)
+            await asyncio.to_thread(services.viewers.reap)

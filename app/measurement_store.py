@@ -99,7 +99,10 @@ class MeasurementStore:
         self, connection: Connection, session: str, new: Sequence[NewMeasurement]
     ) -> list[str]:
         """Keep all of them within a transaction, whatever room there is; their ids."""
-        ids, now = [secrets.token_hex(8) for _ in new], time.time()
+        ids = [secrets.token_hex(8) for _ in new]
+        newest = select(func.max(measurements.c.created)).where(measurements.c.session == session)
+        # Also where the clock has gone back, what comes later is later.
+        now = max(time.time(), (connection.execute(newest).scalar_one() or 0.0) + 1e-3)
         hashes = self._files.keep(connection, [one.data for one in new])
         for order, (measurement, sha256, one) in enumerate(zip(ids, hashes, new, strict=True)):
             connection.execute(

@@ -21,7 +21,8 @@ OTHER_ORIGIN = "Requests from pages of another origin are refused; use the servi
 def refusal(scope: Scope, hosts: frozenset[str], public_url: str) -> str | None:
     """Why a request may not come in, or None."""
     headers = Headers(scope=scope)
-    host = headers.get("host", "").lower()
+    # Of two it is not known which one is meant.
+    host = ",".join(headers.getlist("host")).lower()
     if without_port(host) not in hosts:
         return (
             "This service does not answer to that host name; use its own address, or add the name "

@@ -9,6 +9,7 @@ from typing import Annotated, Any, get_args
 
 import numpy as np
 from fastapi import APIRouter, Depends
+from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
 from ..engine.channels import CHANNELS
@@ -39,6 +40,7 @@ router = APIRouter(
     dependencies=[Depends(require_visitor)],
 )
 
+Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 Sensors = Annotated[Upload, Depends(receive("sensors.toml"))]
 
 
@@ -68,14 +70,14 @@ def _accepted(name: str) -> dict[str, float]:
 
 
 @router.post("/parameters/bounds")
-def bounds(request: StartValues) -> dict[str, tuple[float, float] | None]:
+def bounds(request: StartValues) -> dict[str, Pair | None]:
     """Default bounds of a fit from these start values; null where none follow from the start."""
     return {parameter(name).name: _bounds(name, start) for name, start in request.start.items()}
 
 
-def _bounds(name: str, start: float) -> tuple[float, float] | None:
+def _bounds(name: str, start: float) -> Pair | None:
     try:
-        return default_bounds(name, start)
+        return list(default_bounds(name, start))
     except ParameterError:
         return None
 

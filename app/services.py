@@ -68,4 +68,9 @@ def services_of(connection: HTTPConnection) -> Services:
     return cast(Any, connection.app).state.services
 
 
-Shared = Annotated[Services, Depends(services_of)]
+async def _shared(connection: HTTPConnection) -> Services:
+    """As `services_of`; what is not asynchronous would wait for a thread of the pool."""
+    return services_of(connection)
+
+
+Shared = Annotated[Services, Depends(_shared)]

@@ -66,6 +66,7 @@ class Limits:
     swept_steps: int = 2_000_000_000
     driven_seconds: float = 600.0
     long_driven_seconds: float = 200.0
+    unwatched_seconds: float = 600.0
 
 
 @dataclass(frozen=True)

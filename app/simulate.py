@@ -3,15 +3,17 @@
 Imported with the first simulation, because it brings numba and scipy.
 """
 
+import json
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 from ..engine.channels import channel
 from ..engine.identification.bands import Bands, bands
 from ..engine.identification.kept_fit import fit_from_json
+from ..engine.remembered import Remembered
 from ..engine.run import Run
 from ..engine.simulation.excitation import Excitation
 from ..engine.simulation.metrics import Metric, metrics
@@ -115,18 +117,26 @@ def reply(request: SimulationRequest, task: Task) -> Reply:
     return Reply(found.run, head, within)
 
 
+_METRIC = tuple(field.name for field in fields(Metric))
+
+
 def _metric(metric: Metric, within: Bands | None) -> dict[str, Any]:
     """A figure, with its interval where there are bands; null for an end that is open."""
-    told = asdict(metric)
+    told = {name: getattr(metric, name) for name in _METRIC}
     interval = within.figures.get(metric.name) if within else None
     return told if interval is None else {**told, "interval": list(interval)}
+
+
+_VEHICLES: Remembered[str, Vehicle] = Remembered(256)
+"""Checked vehicles by their JSON."""
 
 
 def _vehicle(request: SimulationRequest, session: str, store: Store) -> Vehicle:
     data: Mapping[str, Any] = (
         store.sessions.get(session).vehicle if request.vehicle is None else request.vehicle
     )
-    vehicle = vehicle_from_json(data)
+    # A slider sends the same car again and again with other values.
+    vehicle = _VEHICLES.made(json.dumps(data), lambda: vehicle_from_json(data), lambda _: 1)
     return vehicle.with_values(request.values) if request.values else vehicle
 
 

@@ -5,7 +5,7 @@ from collections.abc import AsyncIterator, Callable
 from tempfile import SpooledTemporaryFile
 from typing import Any, BinaryIO, cast
 
-from fastapi import Request
+from fastapi import HTTPException, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import UploadFile
 
@@ -60,6 +60,8 @@ def receive(untold: str) -> Callable[..., AsyncIterator[Upload]]:
         with SpooledTemporaryFile(max_size=IN_MEMORY) as file:
             async for chunk in request.stream():
                 await run_in_threadpool(file.write, chunk)
+            if not file.tell():
+                raise HTTPException(400, "The body is empty; send the file.")
             yield Upload(harmless(name) or untold, cast(BinaryIO, file))
 
     return received

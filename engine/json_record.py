@@ -9,8 +9,9 @@ starts with the source and the dotted path of the field and says what to do.
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import MISSING, Field, fields, is_dataclass
 from difflib import get_close_matches
+from functools import cache
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
@@ -35,8 +36,7 @@ class RecordReader:
         """An instance of the dataclass `kind` from a JSON object at a dotted path."""
         if not isinstance(data, Mapping):
             raise self.refuse(path, f"must be an object {{...}}, not {describe(data)}.")
-        hints = get_type_hints(kind, include_extras=True)
-        keys = {field.name.rstrip("_"): field for field in fields(kind)}
+        hints, keys = _shape(kind)
         self.check_keys(data, [*keys, "kind"] if _kind(kind) else list(keys), path)
         values = {}
         for key, field in keys.items():
@@ -109,6 +109,13 @@ class RecordReader:
             self.value(hint, item, f"{path}[{i}]", accepted)
             for i, (hint, item) in enumerate(zip(hints, data, strict=True))
         )
+
+
+@cache
+def _shape(kind: Any) -> tuple[dict[str, Any], dict[str, Field[Any]]]:
+    """Type hints by field, and fields by JSON key."""
+    keys = {field.name.rstrip("_"): field for field in fields(kind)}
+    return get_type_hints(kind, include_extras=True), keys
 
 
 def record_to_json(record: Any) -> Any:

@@ -34,7 +34,7 @@ def cold(_: Workbench) -> Row:
     """Every kernel, compiled into a folder of its own."""
     with tempfile.TemporaryDirectory() as folder:
         began = time.perf_counter()
-        compilers = compile.start_compilers(_environment() | {"RIDETUNE_CACHE": folder})
+        compilers = compile.start_compilers(bare_environment() | {"RIDETUNE_CACHE": folder})
         for compiler in compilers:
             compiler.wait(PATIENCE)
         seconds = time.perf_counter() - began
@@ -63,7 +63,7 @@ def _python(*arguments: str) -> float:
     began = time.perf_counter()
     subprocess.run(
         [sys.executable, *arguments],
-        env=_environment(),
+        env=bare_environment(),
         stdout=subprocess.DEVNULL,
         timeout=PATIENCE,
         check=True,
@@ -71,7 +71,7 @@ def _python(*arguments: str) -> float:
     return time.perf_counter() - began
 
 
-def _environment() -> dict[str, str]:
+def bare_environment() -> dict[str, str]:
     """This process's, without what the service is told by it."""
     told = {name for name in os.environ if name.startswith("RIDETUNE_")} - {"RIDETUNE_CACHE"}
     return {name: value for name, value in os.environ.items() if name not in told}
@@ -84,7 +84,7 @@ def _until_answered() -> float:
         command += ["--port", "0", "--data", folder]
         began = time.perf_counter()
         with subprocess.Popen(
-            command, env=_environment(), stdout=subprocess.PIPE, text=True
+            command, env=bare_environment(), stdout=subprocess.PIPE, text=True
         ) as service:
             try:
                 assert service.stdout is not None

@@ -53,6 +53,14 @@ def test_a_job_is_claimed_once_by_priority_then_by_age(store, session):
     assert (kept.owner, kept.state, kept.priority, kept.restarts) == ("a", "queued", 1, 0)
 
 
+def test_a_later_job_is_later_although_the_clock_went_back(store, session, later):
+    first = queued(store, session)
+    later(-3600.0)
+    second = queued(store, session)
+    assert [job.id for job in store.jobs.of_session(session, "test")] == [first, second]
+    assert claimed(store, "a", 1) == [first]
+
+
 def test_a_job_that_nobody_claims_for_long_is_not_lost(store, session, later):
     job = queued(store, session)
     later(86_400.0)

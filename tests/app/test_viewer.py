@@ -8,7 +8,7 @@ import pytest
 from ridetune.app import viewer
 from ridetune.app.errors import Busy, Unavailable
 from ridetune.app.settings import Limits
-from ridetune.app.viewer import Viewers
+from ridetune.app.viewer import Viewers, relay
 from ridetune.app.viser_servers import ADMISSION, HEADER
 from ridetune.engine.vehicle_file import reference_vehicles
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -139,7 +139,7 @@ def test_a_tab_that_is_gone_before_it_is_answered_is_no_error(client, visitor, t
         sent.append(message["type"])
         raise OSError
 
-    client.portal.call(viewer.relay, WebSocket(scope, receive, send), visitor.id)
+    client.portal.call(relay, WebSocket(scope, receive, send), visitor.id)
     assert sent == [*(["websocket.accept"] if token == "its own" else []), "websocket.close"]
     assert client.app.state.services.viewers.start(visitor.id).watchers == 0
 
@@ -235,8 +235,8 @@ def test_a_browser_that_floods_is_hung_up_on(client, visitor):
     assert (last["type"], last["code"]) == ("websocket.close", 1008)
 
 
-def test_only_unwatched_viewers_are_reaped(viewers, monkeypatch):
-    monkeypatch.setattr(viewer, "UNWATCHED_SECONDS", 0.0)
+def test_only_unwatched_viewers_are_reaped(viewers):
+    viewers.limits = Limits(unwatched_seconds=1e-6)
     viewers.watch("watched", 1)
     gone = viewers.start("gone")
     time.sleep(0.01)

@@ -1,0 +1,1 @@
+"""How the running service bears its users: what they wait for, what they cost, what it takes."""
