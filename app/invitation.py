@@ -34,8 +34,10 @@ def link(address: str, secret: str) -> str:
 
 
 def link_command(settings: Settings) -> str:
-    """What makes a link, as it can be typed on this machine; strangers are told no paths."""
-    if not is_loopback(settings.host):
+    """What makes a link, as it can be typed on this machine; who comes from others is told no
+    paths of it.
+    """
+    if settings.public_url or settings.allowed_hosts or not is_loopback(settings.host):
         return "ridetune link"
     elsewhere = settings.data.absolute() != usual_data(os.environ).absolute()
     data = ["--data", str(settings.data.absolute())] if elsewhere else []

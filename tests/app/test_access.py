@@ -40,10 +40,10 @@ def go(client, path="/", **options):
     return client.get(path, follow_redirects=False, **options)
 
 
-def test_who_was_not_let_in_gets_nothing_but_a_page_that_says_what_to_do(client):
+def test_who_was_not_let_in_gets_nothing_but_a_page_that_says_what_to_do(client, settings):
     page = go(client)
     assert page.status_code == 403
-    assert "ridetune link" in page.text
+    assert f"ridetune link --data {settings.data}" in page.text
     assert page.headers["referrer-policy"] == "no-referrer"
     assert client.post("/api/sessions").status_code == 403
     for path in ("/api/parameters", "/api/vehicles/paper", "/api/sensors"):
@@ -269,9 +269,11 @@ def test_a_user_who_is_told_twice_or_at_length_is_refused(proxied, users):
 
 
 @pytest.mark.parametrize("user", ["", "  "])
-def test_a_proxy_that_names_nobody_lets_nobody_in(proxied, user):
+def test_a_proxy_that_names_nobody_lets_nobody_in(proxied, user, tmp_path):
+    """And tells nothing of the machine."""
     page = go(proxied, headers=named(user))
     assert page.status_code == 403
+    assert str(tmp_path) not in page.text
     assert "https://ride.example.com/" in page.text
 
 

@@ -5,23 +5,14 @@ import pytest
 from .session_routes import Route, routes
 
 ODD = {
-    "escaped": "%2e%2e",
-    "escaped way up": "%2e%2e%2f%2e%2e%2fridetune.sqlite",
-    "escaped twice": "%252e%252e%252f",
-    "backslashes": "..%5c..%5cridetune.sqlite",
-    "absolute": "%2fetc%2fpasswd",
-    "NUL": "%00",
-    "NUL after a name": "x%00.csv",
-    "300 bytes": "x" * 300,
+    "the folder above": "%2e%2e",
+    "a way up": "%2e%2e%2f%2e%2e%2fridetune.sqlite",
+    "a drive": "C:%5c..%5cridetune.sqlite",
     "a device": "CON",
-    "a drive": "C:%5cWindows",
-    "a stream": "x::$DATA",
+    "NUL": "x%00.csv",
+    "300 bytes": "x" * 300,
     "right to left": "%E2%80%AEvsc.x",
     "half a character": "%ED%A0%80",
-    "no UTF-8": "%ff%fe",
-    "a blank": "%20",
-    "any": "*",
-    "SQL": "'%20OR%20'1'='1",
     "a line end": "%0d%0aSet-Cookie:%20x=1",
 }
 OUTSIDE = [
