@@ -24,6 +24,7 @@ from importlib.metadata import version
 from typing import Any
 
 from ..engine.errors import RideError
+from . import logs
 from .cluster import Cluster
 from .errors import NotFound, Unavailable
 from .job_kinds import PATIENT, PROMPT, Kind, Progress
@@ -102,16 +103,18 @@ class Dispatcher:
         kinds: Mapping[str, Kind],
         changed: Callable[[str], None],
         ready: Callable[[], bool],
+        taking: Callable[[], bool] = lambda: True,
     ):
         """`changed` is told the id of each job that has news, in any thread.
 
-        Jobs are claimed once `ready` returns, and only if it returns True.
+        Jobs are claimed once `ready` returns, and only if it returns True; none is, and no unit is
+        sent, while not `taking`.
         """
         self._store = store
         self._cluster = cluster
         self._kinds = kinds
         self._changed = changed
-        self._ready = ready
+        self._ready, self._taking = ready, taking
         self._owner = secrets.token_hex(8)
         self._active: dict[str, _Active] = {}
         self._progress: dict[str, Progress] = {}
@@ -188,8 +191,9 @@ class Dispatcher:
                     self._news.get(timeout=LOOK_EVERY)()
                     while True:
                         self._news.get_nowait()()
-                self._claim()
-                self._send_all()
+                if self._taking():
+                    self._claim()
+                    self._send_all()
                 self._record_progress()
             except Closing:
                 return
@@ -240,7 +244,8 @@ class Dispatcher:
         """In a thread of its own, because files may have to be read."""
         job = active.job
         try:
-            payload = active.kind.payload(job)
+            with logs.about(job=job.id):
+                payload = active.kind.payload(job)
         except RideError as error:
             code, detail = error.code, str(error)
             self._news.put(lambda: self._fail(active, code, detail))

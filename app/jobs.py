@@ -31,13 +31,14 @@ class Jobs:
         kinds: Mapping[str, Kind],
         *,
         ready: Callable[[], bool] = lambda: True,
+        taking: Callable[[], bool] = lambda: True,
     ):
-        """Jobs are sent once `ready` returns, and only if it returns True."""
+        """Jobs are sent once `ready` returns, and only if it returns True, and while `taking`."""
         self._store = store
         self._kinds = kinds
         self._followers: dict[str, set[asyncio.Event]] = {}
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._dispatcher = Dispatcher(store, cluster, kinds, self._wake, ready)
+        self._dispatcher = Dispatcher(store, cluster, kinds, self._wake, ready, taking)
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
         """Take up what a former run of the service left unfinished."""

@@ -99,11 +99,12 @@ def configure_worker() -> None:
 
 
 def adopt(*loggers: str) -> None:
-    """Let a library's records go the way of ours, where it has handlers of its own."""
+    """Let a library's warnings go the way of ours, where it has handlers and levels of its own."""
     for name, logger in logging.root.manager.loggerDict.items():
         if isinstance(logger, logging.Logger) and name.partition(".")[0] in loggers:
             logger.handlers.clear()
             logger.propagate = True
+            logger.setLevel(max(logger.level, logging.WARNING))
 
 
 _root = logging.getLogger()

@@ -1,6 +1,7 @@
 """Numbers of a running service that are looked up when somebody asks for its metrics."""
 
 import logging
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
@@ -36,15 +37,26 @@ class ServicesCollector(Collector):
         count: Callable[..., Any] = func.count
         with self._services.store.database.reading() as connection:
             kept = connection.execute(select(count()).select_from(sessions)).scalar_one()
-            grouped = select(jobs.c.kind, jobs.c.state, count()).group_by(jobs.c.kind, jobs.c.state)
-            states = connection.execute(grouped).all()
+            grouped = select(
+                jobs.c.kind, jobs.c.state, count(), func.sum(jobs.c.attempts)
+            ).group_by(jobs.c.kind, jobs.c.state)
+            rows = connection.execute(grouped).all()
+        lost: Counter[str] = Counter()
+        for kind, _, _, attempts in rows:
+            lost[kind] += attempts
         return [
             _gauge("sessions", "Sessions that are kept.", kept),
             _gauges(
                 "jobs",
                 "Jobs that are kept.",
                 ("kind", "state"),
-                {(kind, state): number for kind, state, number in states},
+                {(kind, state): number for kind, state, number, _ in rows},
+            ),
+            _gauges(
+                "lost_attempts",
+                "How often kept jobs lost their workers.",
+                ("kind",),
+                {(kind,): number for kind, number in lost.items()},
             ),
         ]
 

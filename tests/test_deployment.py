@@ -17,8 +17,8 @@ DEPLOY = ROOT / "docs" / "deploy"
 FILES = sorted(DEPLOY.iterdir())
 COMPOSE = yaml.safe_load((DEPLOY / "compose.yaml").read_text())
 DOCKERFILE = (DEPLOY / "Dockerfile").read_text()
-READ_ELSEWHERE = {"RIDETUNE_CACHE", "RIDETUNE_DATABASE"}
-"""By the engine, and by the store of rows."""
+READ_ELSEWHERE = {"RIDETUNE_CACHE"}
+"""By the engine."""
 
 
 class Asked(dict):

@@ -48,11 +48,14 @@ class Team:
         self.ann, self.bob = (self.store.sessions.create({}, [])[0] for _ in range(2))
         self.sessions: dict[str, str] = {}
         self.dispatchers: list[Dispatcher] = []
+        self.taking = True
 
     def dispatch(self) -> StandIn:
         """The cluster of one more."""
         cluster = StandIn("", None)
-        made = Dispatcher(self.store, cluster, KINDS, lambda job: None, lambda: True)
+        made = Dispatcher(
+            self.store, cluster, KINDS, lambda job: None, lambda: True, lambda: self.taking
+        )
         self.dispatchers.append(made)
         made.start()
         return cluster
@@ -103,6 +106,24 @@ def test_units_run_as_many_as_there_are_workers_and_the_result_is_made_of_all(te
     cluster.end(job, "done", result={"rows": 5})
     until(lambda: team.state(job) == "done")
     assert team.store.parts(job) == {}
+
+
+def test_a_service_that_is_about_to_end_begins_nothing_more(team):
+    """What runs goes on; units that wait, and a job that comes, are for who takes them up next."""
+    cluster = team.dispatch()
+    job = team.submit("sweep", team.ann, "abcde")
+    until(lambda: len(cluster.tasks) == WIDTH)
+    team.taking = False
+    late = team.submit("fit", team.bob)
+    for unit in "abc":
+        make(cluster, job, unit)
+    until(lambda: team.dispatchers[0].progress(job) == {"made": 3, "of": 5})
+    assert cluster.tasks == {}
+    assert team.state(late) == "queued"
+    team.dispatchers.pop().close()
+    team.taking = True
+    other = team.dispatch()
+    until(lambda: {f"{job}/d", f"{job}/e", late} == set(other.tasks))
 
 
 def until_sent(team: Team, cluster: StandIn, task: str) -> None:

@@ -11,7 +11,9 @@ import urllib.request
 import pytest
 from ridetune.app.draining import Drain, Draining
 from ridetune.app.notify import notify
+from ridetune.app.server import Server
 from starlette.responses import StreamingResponse
+from uvicorn import Config
 
 from .live import LiveService
 from .loop import in_a_loop
@@ -140,6 +142,30 @@ def test_a_request_under_way_is_answered_before_the_end(tmp_path):
             connection.sendall(b"}")
             assert connection.recv(1000).startswith(b"HTTP/1.1 200 OK")
         assert service.process.wait(PATIENCE) == 0
+
+
+@pytest.mark.parametrize(
+    ("under_way", "goes"), [(0, [False, False, True, True]), (1, [False, False, False, True])]
+)
+def test_it_gives_notice_and_then_its_grace(under_way, goes):
+    """Told at 10 s: 2 s of notice, and 5 s more for what is under way."""
+    now, draining = [0.0], Draining()
+    draining.under_way = under_way
+
+    async def app(scope, receive, send):
+        raise AssertionError
+
+    server = Server(Config(app), draining, grace=5, notice=2, clock=lambda: now[0])
+
+    async def at(*times):
+        before = await server.on_tick(1)
+        server.handle_exit(signal.SIGTERM, None)
+        found = []
+        for now[0] in times:
+            found.append(await server.on_tick(1))
+        return before, draining.begun, found
+
+    assert in_a_loop(lambda: at(10.0, 11.9, 16.9, 17.0)) == (False, True, goes)
 
 
 def test_a_second_signal_ends_it_at_once(tmp_path):

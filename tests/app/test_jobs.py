@@ -16,7 +16,7 @@ PATIENCE = 20.0
 class StandIn:
     """A cluster whose tasks do what the test says."""
 
-    def __init__(self, address: str, scratch):
+    def __init__(self, address: str, scratch, certificates=None):
         self.tasks: dict[str, tuple] = {}
         self.cancelled: list[str] = []
         self.graces: dict[str, float] = {}
@@ -62,7 +62,7 @@ def clusters(monkeypatch) -> list[StandIn]:
     """The stand-ins of all services of a test, the latest last."""
     made: list[StandIn] = []
 
-    def make(address, scratch) -> StandIn:
+    def make(address, scratch, certificates) -> StandIn:
         made.append(StandIn(address, scratch))
         return made[-1]
 

@@ -203,6 +203,19 @@ def test_the_form_and_the_level_are_settings(tmp_path):
     assert (settings.log, settings.log_level) == ("json", "INFO")
 
 
+def test_of_a_library_with_handlers_of_its_own_only_warnings_are_written():
+    theirs = logging.getLogger("a_library.part")
+    theirs.addHandler(logging.NullHandler())
+    theirs.setLevel(logging.DEBUG)
+    theirs.propagate = False
+    logs.adopt("a_library")
+    assert (theirs.handlers, theirs.propagate) == ([], True)
+    assert [theirs.isEnabledFor(level) for level in (logging.INFO, logging.WARNING)] == [
+        False,
+        True,
+    ]
+
+
 def test_every_request_is_one_record(settings, lines):
     with open_client(settings) as client:
         Visitor(client).get("")

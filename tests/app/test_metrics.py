@@ -11,7 +11,8 @@ from prometheus_client.parser import text_string_to_metric_families
 from ridetune.app.main import create_app
 from ridetune.app.observed import METHODS
 from ridetune.app.settings import Settings
-from sqlalchemy import text
+from ridetune.app.tables import jobs
+from sqlalchemy import text, update
 from sqlalchemy.exc import OperationalError
 
 from .conftest import ADDRESS, Visitor, short_recording
@@ -87,6 +88,21 @@ def test_uploads_are_bytes_received(client):
         route="/api/sessions/{sid}/measurements",
     )
     assert len(data) < received < len(data) + 1000
+
+
+def test_jobs_are_counted_by_kind_and_state_with_what_they_lost(client):
+    visitor = Visitor(client)
+    kept = client.app.state.services.store
+    ids = [kept.jobs.add(visitor.id, "sweep", {"asked": ""}, None)[0].id for _ in range(3)]
+    with kept.database.writing() as connection:
+        begun = update(jobs).where(jobs.c.id == ids[0])
+        connection.execute(begun.values(state="running", attempts=2))
+        ended = update(jobs).where(jobs.c.id != ids[0])
+        connection.execute(ended.values(state="done"))
+    found = samples(client)
+    assert value(found, "jobs", kind="sweep", state="running") == 1
+    assert value(found, "jobs", kind="sweep", state="done") == 2
+    assert value(found, "lost_attempts", kind="sweep") == 2
 
 
 def test_work_of_the_pools_is_timed(client):

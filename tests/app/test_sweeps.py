@@ -258,7 +258,7 @@ def test_what_goes_to_the_worker_is_everything_it_needs(tmp_path, monkeypatch):
     """The same payload after a restart, though the session's car has changed."""
     made = []
     monkeypatch.setattr(
-        "ridetune.app.main.Cluster", lambda *place: made.append(StandIn(*place)) or made[-1]
+        "ridetune.app.main.Cluster", lambda *place, **told: made.append(StandIn(*place)) or made[-1]
     )
     settings = Settings(data=tmp_path)
     with open_client(settings) as client:
