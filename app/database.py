@@ -64,6 +64,9 @@ class Database(ABC):
         """Transaction that commits durably at its end, or leaves no trace."""
         with self._in_a_sentence(), self._writer.begin() as connection:
             yield connection
+        if self._troubled:
+            self._troubled = False
+            log.warning("The service's database takes changes again.")
 
     @abstractmethod
     def lock(self, connection: Connection, names: Collection[str]) -> None:
@@ -101,10 +104,6 @@ class Database(ABC):
                 self._troubled = True
                 log.warning("%s", trouble)
             raise trouble from None
-        else:
-            if self._troubled:
-                self._troubled = False
-                log.warning("the database can be used again")
 
 
 def _check_schema(connection: Connection, name: str) -> None:

@@ -8,6 +8,7 @@ stands for the file's folder, for another service may be writing the same file j
 import hashlib
 import logging
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 from sqlalchemy import Connection, delete, exists, func, insert, select
@@ -16,7 +17,7 @@ from .data_directory import DataDirectory
 from .database import Database
 from .errors import Busy, Unavailable
 from .settings import Limits
-from .storage import files_in_a_sentence
+from .storage import OUT_OF_ORDER, files_in_a_sentence
 from .tables import job_files, job_parts, jobs, mappings, measurements, uploads
 
 log = logging.getLogger(__name__)
@@ -48,6 +49,13 @@ class FileStore:
                     )
                 )
         return [hashlib.sha256(data).hexdigest() for data in files]
+
+    def original(self, sha256: str) -> Path:
+        """Place of a file that has its row."""
+        place = self._directory.original(sha256)
+        if not place.is_file():
+            raise Unavailable(OUT_OF_ORDER, retry_after=30)
+        return place
 
     def require_room(self, session: str, more: int) -> None:
         """Raise Busy where a session cannot keep so many bytes more."""

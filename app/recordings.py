@@ -27,6 +27,7 @@ from ..engine.simulation.rims_settings import RimsSettings
 from ..engine.step_record import step_records_from_json
 from .errors import Deleted, NotFound
 from .measurement_store import Measurement, NewMeasurement
+from .storage import trouble_of
 from .store import Store
 
 if TYPE_CHECKING:
@@ -206,8 +207,8 @@ def _readable(name: str) -> Iterator[None]:
     except FileNotFoundError:
         raise NotFound(f"{name} has been deleted meanwhile; choose another measurement.") from None
     except OSError as error:
-        raise MeasurementError(
-            f"{name}: there is no room to read the file ({error.strerror}); try again later."
+        raise trouble_of(error) or MeasurementError(
+            f"{name}: the file cannot be read just now ({error.strerror}); try again later."
         ) from error
 
 

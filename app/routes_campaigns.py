@@ -141,7 +141,7 @@ def _result(job: Job) -> Mapping[str, Any]:
 
 def _archive(services: Services, job: Job) -> Any:
     assert job.file is not None
-    return services.store.directory.original(job.file)
+    return services.store.files.original(job.file)
 
 
 def _read(services: Services, job: Job, name: str) -> bytes:

@@ -73,7 +73,7 @@ def cars(
     if job.file is None:
         remedy = "ask for it again" if job.ended else "wait until it is done"
         raise Conflict(f"The sweep has no rows, its state is {job.state}; {remedy}.")
-    kept = services.store.directory.original(job.file)
+    kept = services.store.files.original(job.file)
     if form == "parquet":
         return FileResponse(kept, filename="cars.parquet", media_type=MEDIA_TYPES[form])
     return StreamingResponse(

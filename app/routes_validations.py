@@ -63,4 +63,4 @@ def _document(services: Services, sid: str, jid: str) -> Any:
     if job.file is None:
         remedy = "ask for it again" if job.ended else "wait until it is done"
         raise Conflict(f"The validation has no report, its state is {job.state}; {remedy}.")
-    return services.store.directory.original(job.file)
+    return services.store.files.original(job.file)

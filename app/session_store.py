@@ -6,6 +6,7 @@ import json
 import secrets
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -95,7 +96,9 @@ class SessionStore:
         now = time.time()
         if now - self._seen.get(session, 0.0) > SEEN_EVERY:
             self._seen[session] = now
-            self._set(session, seen=now)
+            # Where nothing can be written, what is kept may still be looked at.
+            with suppress(Unavailable):
+                self._set(session, seen=now)
         return True
 
     def get(self, session: str) -> Session:

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from .errors import StorageFull, Unavailable
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-OUT_OF_ORDER = (
+NOT_TO_BE_USED = (
     errno.EACCES,
     errno.EIO,
     errno.ENODEV,
@@ -18,18 +18,18 @@ OUT_OF_ORDER = (
     errno.ESTALE,
     errno.ETIMEDOUT,
 )
+OUT_OF_ORDER = (
+    "The service's data directory cannot be used; see that it is there, on a disk that works, and"
+    " may be written, then try again."
+)
 
 
 def trouble_of(error: OSError) -> Unavailable | None:
     """None for what is no trouble of a disk."""
     if error.errno in FULL:
         return StorageFull()
-    if error.errno in OUT_OF_ORDER:
-        return Unavailable(
-            "The service's data directory cannot be used; see that it is there, on a disk that "
-            "works, and may be written, then try again.",
-            retry_after=30,
-        )
+    if error.errno in NOT_TO_BE_USED:
+        return Unavailable(OUT_OF_ORDER, retry_after=30)
     return None
 
 
