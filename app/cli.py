@@ -90,6 +90,8 @@ def command_line() -> Parser:
     takes.validate(add("validate", _validate, "Identify a car and report what it predicts."))
     takes.advise(add("advise", _advise, "Tell which manoeuvre to drive next."))
     takes.campaign(add("campaign", _campaign, "Measure a car that is known, as files."))
+    takes.backup(add("backup", _backup, "Copy everything that a service keeps into one file."))
+    takes.restore(add("restore", _restore, "Restore a backup into an empty directory."))
     takes.bench(add("bench", _bench, "Measure the engine and its peers on this machine."))
     return parser
 
@@ -165,6 +167,18 @@ def _campaign(options: argparse.Namespace) -> None:
     from .commands.campaign import campaign
 
     campaign(options)
+
+
+def _backup(options: argparse.Namespace) -> None:
+    from .commands.backup import backup
+
+    backup(options)
+
+
+def _restore(options: argparse.Namespace) -> None:
+    from .commands.backup import restore
+
+    restore(options)
 
 
 def _bench(options: argparse.Namespace) -> None:

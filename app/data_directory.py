@@ -24,6 +24,9 @@ from pathlib import Path
 
 from .errors import StartError
 
+DATABASE = "ridetune.sqlite"
+MARK = "postgresql.id"
+
 
 class DataDirectory:
     """The folder, once it is clear whose it is; `close` gives it up.
@@ -62,7 +65,7 @@ class DataDirectory:
             beside = self._mark.with_suffix(f".{secrets.token_hex(4)}.tmp")
             _write(beside, f"{database}\n".encode())
             os.replace(beside, self._mark)
-            _flush_folder(self.path)
+            flush(self.path)
         if self._mark.read_text().strip() != database:
             raise StartError(
                 f"The data directory {self.path} belongs to another PostgreSQL database; choose "
@@ -90,12 +93,12 @@ class DataDirectory:
 
     @property
     def _mark(self) -> Path:
-        return self.path / "postgresql.id"
+        return self.path / MARK
 
     @property
     def database(self) -> Path:
         """Place of the database file."""
-        return self.path / "ridetune.sqlite"
+        return self.path / DATABASE
 
     @property
     def scratch(self) -> Path:
@@ -109,7 +112,7 @@ class DataDirectory:
 
     def original(self, sha256: str) -> Path:
         """Place of an original."""
-        return self.originals / sha256[:2] / sha256
+        return place_of_original(self.path, sha256)
 
     def keep(self, sha256: str, data: bytes) -> None:
         """Write an original so that it survives a power cut, unless it is there."""
@@ -125,7 +128,7 @@ class DataDirectory:
             beside.unlink(missing_ok=True)
             raise
         for folder in (place.parent, self.originals):
-            _flush_folder(folder)
+            flush(folder)
 
     def names(self) -> Iterator[str]:
         """The originals by their SHA-256, and what was written of some."""
@@ -152,6 +155,11 @@ class DataDirectory:
             os.close(self._lock)
 
 
+def place_of_original(data: Path, sha256: str) -> Path:
+    """Place of an original in a data directory."""
+    return data / "originals" / sha256[:2] / sha256
+
+
 def _write(place: Path, data: bytes) -> None:
     with open(place, "wb") as file:
         file.write(data)
@@ -159,8 +167,9 @@ def _write(place: Path, data: bytes) -> None:
         os.fsync(file.fileno())
 
 
-def _flush_folder(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY)
+def flush(place: Path) -> None:
+    """Wait until a file or a folder is on the disk."""
+    descriptor = os.open(place, os.O_RDONLY)
     try:
         os.fsync(descriptor)
     finally:

@@ -37,13 +37,16 @@ class Database(ABC):
 
     shared: bool
 
-    def __init__(self, name: str, reader: Engine, writer: Engine):
+    def __init__(self, name: str, reader: Engine, writer: Engine, *, made: bool = False):
+        """made : whether it has to be there already as this ridetune needs it"""
         self._reader = reader
         self._writer = writer
         self._troubled = False
         try:
-            with self.writing() as connection:
-                self.lock(connection, {"schema"})
+            with self.reading() if made else self.writing() as connection:
+                if not made:
+                    self.lock(connection, {"schema"})
+                    _make_schema(connection)
                 _check_schema(connection, name)
                 self.id = connection.execute(select(database_identity.c.id)).scalar_one()
         except ServiceError as error:
@@ -106,7 +109,8 @@ class Database(ABC):
             raise trouble from None
 
 
-def _check_schema(connection: Connection, name: str) -> None:
+def _make_schema(connection: Connection) -> None:
+    """Make the tables, or bring those of an earlier version up to date."""
     if not inspect(connection).has_table(schema_version.name):
         metadata.create_all(connection)
         connection.execute(insert(schema_version).values(version=SCHEMA_VERSION))
@@ -116,10 +120,16 @@ def _check_schema(connection: Connection, name: str) -> None:
         for statement in chain.from_iterable(MIGRATIONS[version - 1 :]):
             connection.exec_driver_sql(statement)
         connection.execute(update(schema_version).values(version=SCHEMA_VERSION))
-    elif version != SCHEMA_VERSION:
-        raise StartError(
-            f"{name} has schema version {version}, this ridetune needs {SCHEMA_VERSION}; use the "
-            "ridetune that wrote it, or another --data directory."
-        )
-    if connection.execute(select(database_identity.c.id)).one_or_none() is None:
+    if version <= SCHEMA_VERSION and not connection.execute(select(database_identity.c.id)).all():
         connection.execute(insert(database_identity).values(id=secrets.token_hex(16)))
+
+
+def _check_schema(connection: Connection, name: str) -> None:
+    known = inspect(connection).has_table(schema_version.name)
+    version = known and connection.execute(select(schema_version.c.version)).scalar_one()
+    if version != SCHEMA_VERSION:
+        has = f"has schema version {version}" if known else "is empty"
+        raise StartError(
+            f"{name} {has}, this ridetune needs {SCHEMA_VERSION}; use the ridetune that wrote it, "
+            "or another --data directory."
+        )

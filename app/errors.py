@@ -13,6 +13,12 @@ class StartError(RideError):
     code = "start"
 
 
+class BackupError(RideError):
+    """A backup cannot be made, or not be restored."""
+
+    code = "backup"
+
+
 class ServiceError(RideError):
     """A request that the service itself refuses; `field` is the place in it where there is one."""
 

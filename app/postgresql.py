@@ -60,7 +60,7 @@ class PostgresqlDatabase(Database):
 
     shared = True
 
-    def __init__(self, url: str):
+    def __init__(self, url: str, *, made: bool = False):
         address = _address(url)
         if not find_spec("psycopg"):
             raise StartError(
@@ -80,7 +80,7 @@ class PostgresqlDatabase(Database):
         snapshot = engine.execution_options(
             isolation_level="REPEATABLE READ", postgresql_readonly=True
         )
-        super().__init__("The database of RIDETUNE_DATABASE", snapshot, engine)
+        super().__init__("The database of RIDETUNE_DATABASE", snapshot, engine, made=made)
 
     def lock(self, connection: Connection, names: Collection[str]) -> None:
         """By advisory locks, in one order so that nobody waits in a circle."""

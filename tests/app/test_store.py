@@ -14,7 +14,6 @@ from ridetune.app.data_directory import DataDirectory
 from ridetune.app.errors import Busy, Conflict, NotFound, StartError
 from ridetune.app.measurement_store import NewMeasurement
 from ridetune.app.settings import Limits
-from ridetune.app.setup_form import SetupForm
 from ridetune.app.store import Store
 
 CAR = {"name": "a car"}
@@ -99,53 +98,6 @@ def test_a_database_of_another_version_is_refused(tmp_path):
     with pytest.raises(StartError, match="version 99"):
         Store(tmp_path, Limits())
     DataDirectory(tmp_path).close()
-
-
-@pytest.mark.parametrize("version", [1, 2, 3, 4, 5, 6])
-def test_a_database_of_an_earlier_version_is_taken_over(tmp_path, version):
-    """Oracle: what it kept; afterwards it keeps all that is new since like any other."""
-    store = Store(tmp_path, Limits())
-    session, _ = store.sessions.create(CAR, [recording()])
-    done, job = queued(store, session), queued(store, session)
-    store.finish_job(done, "done", result={"cost": 1.5})
-    store.close()
-    with sqlite3.connect(tmp_path / "ridetune.sqlite") as connection:
-        for column in ("owner", "heartbeat_at", "cancel_asked", "priority"):
-            connection.execute(f"ALTER TABLE jobs DROP COLUMN {column}")
-        connection.execute("DROP TABLE job_parts")
-        if version < 6:
-            connection.execute("ALTER TABLE sessions DROP COLUMN setup")
-        if version < 5:
-            connection.execute("ALTER TABLE measurements DROP COLUMN conditioned")
-        if version < 4:
-            for column in ("mapping", "conditioning"):
-                connection.execute(f"ALTER TABLE measurements DROP COLUMN {column}")
-            connection.execute("DROP TABLE mappings")
-        if version < 3:
-            connection.execute("ALTER TABLE measurements DROP COLUMN manoeuvre")
-        if version == 1:
-            connection.execute("DROP TABLE job_files")
-        connection.execute("UPDATE schema_version SET version = ?", [version])
-    connection.close()
-    store = Store(tmp_path, Limits())
-    assert store.jobs.get(session, done).result == {"cost": 1.5}
-    [kept] = store.measurements.of_session(session)
-    assert (kept.manoeuvre, kept.mapping, kept.conditioning) == (None, None, None)
-    measured = store.measurements
-    assert measured.set_mapping(session, kept.id, {"columns": []}, {}, {}).mapping is not None
-    store.mappings.keep(session, "car 7", {"columns": []})
-    steps = {"steps": [], "vehicle": None}
-    assert measured.set_conditioning(session, kept.id, steps, kept.summary).conditioning == steps
-    done = [{"step": {"kind": "rest"}}]
-    assert measured.set_notes(session, kept.id, {}, done, kept.summary).conditioned == done
-    assert store.sessions.get(session).setup is None
-    store.setups.change(session, SetupForm(starts=16))
-    assert (store.sessions.get(session).setup or {})["starts"] == 16
-    assert measured.set_manoeuvre(session, kept.id, {"name": "lap"}).manoeuvre == {"name": "lap"}
-    assert [one.id for one in store.jobs.claim("me", 5)] == [job]
-    assert store.keep_part(job, "first", b"half the rows")
-    assert store.finish_job(job, "done", result={}, file=b"rows")
-    store.close()
 
 
 def test_everything_is_there_after_reopening(tmp_path, database):
