@@ -271,6 +271,13 @@ class JobStore:
             self._cancel(connection, connection.execute(unowned).scalars().all())
         return self.get(session, job)
 
+    def hold_in(self, connection: Connection, job: str) -> bool:
+        """Hold a job's row to the end of a transaction, before its files; False where it has ended
+        or is gone.
+        """
+        row = select(jobs.c.id).where(jobs.c.id == job, jobs.c.state.in_(UNFINISHED))
+        return connection.execute(row.with_for_update()).one_or_none() is not None
+
     def finish_in(
         self,
         connection: Connection,
@@ -281,9 +288,8 @@ class JobStore:
         error: Mapping[str, str] | None = None,
         progress: Mapping[str, Any] | None = None,
         file: str | None = None,
-    ) -> bool:
-        """Give a job its final state within a transaction, in which its result comes and its parts
-        go; False if it had one.
+    ) -> None:
+        """Give a job that is held its final state; its result comes with it, its parts go.
 
         file : SHA-256 of what it made, which is kept already
         """
@@ -292,17 +298,12 @@ class JobStore:
             values["error"] = json.dumps(dict(error))
         if progress is not None:
             values["progress"] = json.dumps(dict(progress))
-        ended = connection.execute(
-            update(jobs).where(jobs.c.id == job, jobs.c.state.in_(UNFINISHED)).values(**values)
-        )
-        if not ended.rowcount:
-            return False
+        connection.execute(update(jobs).where(jobs.c.id == job).values(**values))
         if result is not None:
             connection.execute(insert(results).values(job=job, body=json.dumps(dict(result))))
         if file is not None:
             connection.execute(insert(job_files).values(job=job, sha256=file))
         connection.execute(delete(job_parts).where(job_parts.c.job == job))
-        return True
 
     def save_progress(self, job: str, owner: str, progress: Mapping[str, Any]) -> None:
         """Keep how far its owner's job has come."""

@@ -9,6 +9,7 @@ import json
 import os
 import re
 import shutil
+import struct
 import zlib
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -30,6 +31,11 @@ from .tables import SCHEMA_VERSION, uploads
 
 NAME = re.compile(rf"{ORIGINALS}/([0-9a-f]{{2}})/(\1[0-9a-f]{{62}})|{re.escape(DATABASE)}")
 LONGEST_MANIFEST = 200_000_000
+UNREADABLE = (
+    *(BadZipFile, EOFError, NotImplementedError, OSError, RuntimeError, ValueError),
+    *(struct.error, zlib.error),
+)
+"""What reading a damaged archive may raise."""
 
 
 def restore(path: Path, settings: Settings) -> Kept:
@@ -64,15 +70,14 @@ def _to_postgresql(
 ) -> None:
     with closing(PostgresqlDatabase(settings.database)) as database:
         directory = DataDirectory(settings.data, database.id)
-        with _all_or_none(directory) as put, database.writing() as target:
-            database.lock(target, {"schema"})
+        with _all_or_none(directory) as put:
             if any(vars(counted(database)).values()):
                 raise BackupError(
                     "The database of RIDETUNE_DATABASE is not empty; a backup is restored into a "
                     "fresh one."
                 )
             put(archive, files)
-            with rows.reading() as source:
+            with rows.reading() as source, database.writing() as target:
                 copy_rows(source, target)
 
 
@@ -89,14 +94,13 @@ def _require_empty(settings: Settings) -> None:
 @contextmanager
 def _opened(path: Path) -> Iterator[ZipFile]:
     try:
-        with ZipFile(path) as archive:
-            yield archive
-    except OSError as error:
-        if error.filename != str(path):
-            raise
+        archive = ZipFile(path)
+    except (FileNotFoundError, IsADirectoryError, PermissionError) as error:
         raise BackupError(f"{path} cannot be read ({error.strerror}).") from None
-    except BadZipFile:
+    except UNREADABLE:
         raise _damaged(path, "it is no backup, or cut off") from None
+    with archive:
+        yield archive
 
 
 def _manifest(archive: ZipFile, path: Path) -> dict[str, Any]:
@@ -108,7 +112,7 @@ def _manifest(archive: ZipFile, path: Path) -> dict[str, Any]:
         manifest = json.loads(archive.read(MANIFEST))
         kind, version = manifest["kind"], (manifest["format"], manifest["schema_version"])
         files = {name: (told["sha256"], told["bytes"]) for name, told in manifest["files"].items()}
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except (*UNREADABLE, KeyError, TypeError, AttributeError):
         raise _damaged(path, f"its {MANIFEST} cannot be read") from None
     if kind != KIND:
         raise BackupError(f"{path} is no backup that ridetune backup has made.")
@@ -130,20 +134,25 @@ def _check(
 ) -> None:
     """Compare one file with what the manifest says of it; write it to the target on the way."""
     made, size = hashlib.sha256(), 0
-    try:
-        with (
-            archive.open(name) as source,
-            open(target or os.devnull, "wb") as written,
-        ):
-            while size <= told["bytes"] and (chunk := source.read(CHUNK)):
-                made.update(chunk)
-                size += len(chunk)
-                written.write(chunk)
-    except (BadZipFile, EOFError, NotImplementedError, RuntimeError, zlib.error):
-        raise _damaged(path, f"{name} cannot be read") from None
+    with open(target or os.devnull, "wb") as written:
+        for chunk in _chunks(archive, path, name):
+            made.update(chunk)
+            size += len(chunk)
+            written.write(chunk)
+            if size > told["bytes"]:
+                break
     expected = {told["sha256"]} if name == DATABASE else {told["sha256"], Path(name).name}
     if size != told["bytes"] or {made.hexdigest()} != expected:
         raise _damaged(path, f"{name} is not what it was")
+
+
+def _chunks(archive: ZipFile, path: Path, name: str) -> Iterator[bytes]:
+    try:
+        with archive.open(name) as source:
+            while chunk := source.read(CHUNK):
+                yield chunk
+    except UNREADABLE:
+        raise _damaged(path, f"{name} cannot be read") from None
 
 
 @contextmanager

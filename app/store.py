@@ -15,7 +15,7 @@ from .data_directory import DataDirectory
 from .database import Database
 from .errors import NotFound
 from .file_store import FileStore
-from .job_store import UNFINISHED, JobStore
+from .job_store import JobStore
 from .mapping_store import MappingStore
 from .measurement_store import MeasurementStore
 from .postgresql import PostgresqlDatabase
@@ -24,7 +24,7 @@ from .settings import Limits
 from .setup_store import SetupStore
 from .sqlite import SqliteDatabase
 from .storage import files_in_a_sentence
-from .tables import job_parts, jobs
+from .tables import job_parts
 
 RESTING = 3600.0
 """How long nothing happens to what is left of a file that was being read, s."""
@@ -67,10 +67,12 @@ class Store:
         if it had one.
         """
         with self.database.writing() as connection:
+            if not self.jobs.hold_in(connection, job):
+                return False
             sha256 = None if file is None else self.files.keep(connection, [file])[0]
-            ended = self.jobs.finish_in(connection, job, state, file=sha256, **found)
+            self.jobs.finish_in(connection, job, state, file=sha256, **found)
         self.files.drop_unreferenced()
-        return ended
+        return True
 
     def keep_part(
         self, job: str, name: str, data: bytes, progress: Mapping[str, Any] | None = None
@@ -85,11 +87,7 @@ class Store:
         """
         mine = (job_parts.c.job == job) & (job_parts.c.name == name)
         with self.database.writing() as connection:
-            unfinished = jobs.c.state.in_(UNFINISHED)
-            found = connection.execute(
-                select(jobs.c.id).where(jobs.c.id == job, unfinished).with_for_update()
-            ).one_or_none()
-            if found is None:
+            if not self.jobs.hold_in(connection, job):
                 return False
             if connection.execute(select(job_parts.c.name).where(mine)).one_or_none() is None:
                 [sha256] = self.files.keep(connection, [data])

@@ -303,6 +303,11 @@ def test_a_bit_that_turned_over_is_found(tmp_path, backup, capsys):
         assert harmless or (str(backup) in told_of and not there.exists()), place
 
 
+def test_a_folder_is_no_backup(tmp_path, capsys):
+    there = tmp_path / "there"
+    assert "cannot be read" in refused(capsys, "restore", str(tmp_path), "--data", str(there))
+
+
 def test_what_is_there_is_not_written_over(tmp_path, backup, command, capsys, on_postgresql):
     def said(*arguments: object) -> str:
         return refused(capsys, *map(str, arguments))
