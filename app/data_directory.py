@@ -13,6 +13,7 @@ ended.
 """
 
 import contextlib
+import errno
 import fcntl
 import math
 import os
@@ -43,6 +44,8 @@ class DataDirectory:
             self.originals = path / "originals"
             self.originals.mkdir(exist_ok=True)
             self.reading.mkdir(exist_ok=True)
+            if not os.access(self.originals, os.W_OK):
+                raise PermissionError(errno.EACCES, "it may not be written")
             if database is not None:
                 self._join(database)
                 return

@@ -119,7 +119,8 @@ class PostgresqlDatabase(Database):
             case "42501":
                 return Unavailable(
                     "The service's user may not use its database, or make tables in it; make it "
-                    "the owner of the database, then try again."
+                    "the owner of the database, then try again.",
+                    retry_after=30,
                 )
             case "55P03" | "40P01" | "40001" | "25P03":
                 return Unavailable(

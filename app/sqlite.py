@@ -84,7 +84,8 @@ class SqliteDatabase(Database):
             case sqlite3.SQLITE_CORRUPT | sqlite3.SQLITE_NOTADB:
                 return Unavailable(
                     "The service's database is damaged; restore a backup of it with ridetune "
-                    "restore into another data directory."
+                    "restore into another data directory.",
+                    retry_after=600,
                 )
         return None
 

@@ -57,3 +57,11 @@ def test_this_machine_needs_none(host):
 def test_the_service_answers_to_its_own_and_the_allowed_names():
     settings = Settings(data=Path("x"), host="0.0.0.0", allowed_hosts=("Ride.Example",))
     assert settings.host_names() == {"localhost", "127.0.0.1", "[::1]", "ride.example"}
+
+
+def test_the_address_of_the_database_is_not_shown():
+    """It may hold a password."""
+    url = "postgresql://user:open-sesame@host/name"
+    settings = Settings.from_environment(environment={"RIDETUNE_DATABASE": url})
+    assert settings.database == url
+    assert "open-sesame" not in repr(settings)

@@ -73,6 +73,22 @@ def test_a_directory_that_cannot_be_made_is_named(tmp_path):
         DataDirectory(tmp_path / "file" / "below")
 
 
+def test_a_directory_that_may_not_be_written_is_told_at_the_start(tmp_path, monkeypatch, database):
+    """Oracle: access(2), which also knows of a file system that is mounted read-only."""
+    Store(tmp_path, Limits(), database).close()
+    with monkeypatch.context() as patch:
+        patch.setattr("ridetune.app.data_directory.os.access", lambda path, mode: False)
+        with pytest.raises(StartError, match="may not be written.*--data"):
+            Store(tmp_path, Limits(), database)
+    Store(tmp_path, Limits(), database).close()
+
+
+def test_a_damaged_database_is_told_at_the_start(tmp_path):
+    (tmp_path / "ridetune.sqlite").write_bytes(b"no database at all" * 100)
+    with pytest.raises(StartError, match="damaged; restore a backup"):
+        Store(tmp_path, Limits())
+
+
 def test_sqlite_flushes_every_commit_and_checks_references(tmp_path):
     """WAL, synchronous=FULL (2), foreign keys on: read back from the connection itself."""
     store = Store(tmp_path, Limits())
