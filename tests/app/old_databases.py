@@ -97,6 +97,7 @@ DDL: dict[str, list[tuple[int, str]]] = {
         (7, "job VARCHAR(32) NOT NULL"),
         (7, "name VARCHAR(200) NOT NULL"),
         (7, "sha256 VARCHAR(64) NOT NULL"),
+        (7, "progress TEXT NOT NULL"),
         (7, "PRIMARY KEY (job, name)"),
         (7, JOB),
         (7, UPLOAD),
@@ -210,6 +211,8 @@ def _all_rows(version: int) -> dict[str, list[dict[str, Any]]]:
         ],
         "results": [{"job": "done", "body": '{"cost": 1.5}'}],
         "job_files": [{"job": "done", "sha256": SHA256[1]}],
-        "job_parts": [{"job": "running", "name": "first", "sha256": SHA256[2]}],
+        "job_parts": [
+            {"job": "running", "name": "first", "sha256": SHA256[2], "progress": '{"cars": 5}'}
+        ],
         "database_identity": [{"id": "i" * 32}],
     }

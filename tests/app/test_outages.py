@@ -196,7 +196,7 @@ def test_a_job_s_files_wait_for_room(tmp_path, database, monkeypatch):
             with pytest.raises(Unavailable):
                 keep()
     assert store.jobs.get(session, job.id) == job
-    assert store.part_names(job.id) == []
+    assert store.parts(job.id) == {}
     assert store.keep_part(job.id, "part", b"rows")
     assert store.finish_job(job.id, "done", file=b"rows")
     store.close()
