@@ -5,7 +5,8 @@ and by advisory locks what has no row. Commits wait for the disk whatever the se
 """
 
 import zlib
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import Any
 
@@ -26,7 +27,7 @@ from sqlalchemy.exc import ArgumentError, DataError, DBAPIError
 
 from ..engine.extras import how_to_install
 from .database import Database
-from .errors import InvalidRequest, ServiceError, StartError, StorageFull, Unavailable
+from .errors import InvalidRequest, NotFound, ServiceError, StartError, StorageFull, Unavailable
 
 NAMESPACE = 0x72696465
 """Of the advisory locks; they hold within one database."""
@@ -53,6 +54,10 @@ MISUSED = (
     "RIDETUNE_DATABASE is not the address of a PostgreSQL database; write it like"
     " postgresql://user@host/name, or leave it empty for SQLite in the data directory."
 )
+
+
+class Unkeepable(InvalidRequest):
+    """A text that PostgreSQL does not take."""
 
 
 class PostgresqlDatabase(Database):
@@ -82,6 +87,15 @@ class PostgresqlDatabase(Database):
         )
         super().__init__("The database of RIDETUNE_DATABASE", snapshot, engine, made=made)
 
+    @contextmanager
+    def reading(self) -> Iterator[Connection]:
+        """See `Database.reading`; nothing is found by a text that cannot be kept."""
+        try:
+            with super().reading() as connection:
+                yield connection
+        except Unkeepable:
+            raise NotFound("There is nothing by that name.") from None
+
     def lock(self, connection: Connection, names: Collection[str]) -> None:
         """By advisory locks, in one order so that nobody waits in a circle."""
         for key in sorted({zlib.crc32(name.encode()) for name in names}):
@@ -95,9 +109,7 @@ class PostgresqlDatabase(Database):
     def trouble(self, error: DBAPIError) -> ServiceError | None:
         """By PostgreSQL's SQLSTATE; it has none where the connection was lost."""
         if isinstance(error, DataError):
-            return InvalidRequest(
-                "The request has a text that cannot be kept, such as one with a NUL."
-            )
+            return Unkeepable("The request has a text that cannot be kept: too long, or with NUL.")
         state = getattr(error.orig, "sqlstate", None) or ""
         if error.connection_invalidated or not state or state[:2] in ("08", "28", "3D", "57"):
             return Unavailable(REACH, retry_after=5)

@@ -46,7 +46,7 @@ def filled(store: Store) -> tuple[list[str], list[str]]:
         store.finish_job(done, "done", result={"cost": 1e-300}, file=b"rows " + session.encode())
         store.finish_job(failed, "failed", error={"code": "x", "detail": "y\0z"})
         store.jobs.ask_to_cancel(session, failed)
-        store.keep_part(waiting, "first", b"part " + session.encode())
+        store.keep_part(waiting, "first", b"part " + session.encode(), {"cars": 5})
     return [session for session, _ in made], [token for _, token in made]
 
 
@@ -65,7 +65,11 @@ def picture(store: Store, sessions: list[str]) -> list:
             [(one, store.measurements.original(one).read_bytes()) for one in measurements],
             store.mappings.of_session(session),
             [store.jobs.get(session, job.id) for job in jobs],
-            [(name, store.part(job.id, name)) for job in jobs for name in store.parts(job.id)],
+            [
+                (name, progress, store.part(job.id, name))
+                for job in jobs
+                for name, progress in store.parts(job.id).items()
+            ],
             [
                 store.files.original(job.file).read_bytes()
                 for job in (store.jobs.get(session, job.id) for job in jobs)
