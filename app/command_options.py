@@ -53,16 +53,6 @@ def restore(command: Parser) -> None:
     command.add_argument("--data", metavar="DIR", type=Path, help="empty place for the sessions")
 
 
-def backup(command: Parser) -> None:
-    command.add_argument("--data", metavar="DIR", type=Path, help="where sessions are kept")
-    command.add_argument("-o", "--output", metavar="FILE", required=True, help="the backup as ZIP")
-
-
-def restore(command: Parser) -> None:
-    command.add_argument("backup", metavar="FILE", type=Path, help="what ridetune backup wrote")
-    command.add_argument("--data", metavar="DIR", type=Path, help="empty place for the sessions")
-
-
 def simulate(command: Parser) -> None:
     _add_excitation(command)
     command.add_argument("--model", choices=("8dof", "7dof"), default="8dof")
