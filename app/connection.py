@@ -1,12 +1,13 @@
-"""uvicorn's connections, with limits that they lack: they would wait for ever for a request's head,
-and for a peer that does not read; and what is too much would be refused without a word.
+"""uvicorn's connections, with limits that they lack: they would take a request's head of any length
+and wait for it for ever, and for a peer that does not read; and what is too much would be refused
+without a word.
 """
 
 from asyncio import TimerHandle, Transport
 from typing import Any
 
 from starlette.types import ASGIApp, Receive, Scope, Send
-from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from .draining import PROBES
@@ -14,6 +15,9 @@ from .problems import problem
 from .settings import Limits
 
 RETRY_AFTER = 5
+
+HEAD_BYTES = 65_536
+"""Of a request before its body, but for what comes in one piece with its end."""
 
 
 class _Reading:
@@ -45,10 +49,11 @@ class _Reading:
             self._stalled = None
 
 
-class Connection(_Reading, H11Protocol):
+class Connection(_Reading, HttpToolsProtocol):
     """HTTP/1.1."""
 
     _head: TimerHandle | None = None
+    _head_bytes = 0
     _surplus = False
 
     def connection_made(self, transport: Transport) -> None:
@@ -66,16 +71,20 @@ class Connection(_Reading, H11Protocol):
         super().data_received(data)
         if self._busy():
             self._head_came()
-        elif self._head is None and self.transport.get_protocol() is self:
-            self._await_head()
+        elif self.transport.get_protocol() is self:
+            self._head_bytes += len(data)
+            if self._head_bytes > HEAD_BYTES:
+                self.transport.close()
+            elif self._head is None:
+                self._await_head()
 
-    def handle_websocket_upgrade(self, event: Any) -> None:
+    def handle_websocket_upgrade(self) -> None:
         """The connection goes on as another."""
         self._head_came()
         if self._surplus:
             self.transport.close()
         else:
-            super().handle_websocket_upgrade(event)
+            super().handle_websocket_upgrade()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """The end."""
@@ -89,6 +98,7 @@ class Connection(_Reading, H11Protocol):
         self._head = self.loop.call_later(self.limits.head_seconds, self._give_up)
 
     def _head_came(self) -> None:
+        self._head_bytes = 0
         if self._head is not None:
             self._head.cancel()
             self._head = None

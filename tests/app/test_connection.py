@@ -5,7 +5,7 @@ import json
 
 import pytest
 from ridetune.app.bodies import Body
-from ridetune.app.connection import connections
+from ridetune.app.connection import HEAD_BYTES, connections
 from ridetune.app.settings import Limits
 from starlette.exceptions import HTTPException
 from uvicorn import Config
@@ -129,6 +129,16 @@ def test_a_head_that_trickles_in_is_not_waited_for(connect, loop):
         connection.data_received(bytes([byte]))
         loop.pass_by(1)
     assert peer.ended == "closed"
+
+
+def test_a_head_without_end_is_not_kept(connect):
+    connection, peer = connect()
+    connection.data_received(HEAD)
+    for k in range(1000):
+        connection.data_received(b"X-%d: %s\r\n" % (k, b"x" * 1000))
+        if peer.ended:
+            break
+    assert (peer.ended, k) == ("closed", HEAD_BYTES // 1010)
 
 
 def test_a_request_may_take_its_time_once_its_head_is_there(connect, loop):
