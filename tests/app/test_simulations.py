@@ -286,7 +286,7 @@ def test_a_form_that_does_not_exist_is_not_acceptable(driver):
 def test_while_the_kernels_compile_simulations_wait_and_the_rest_works(settings):
     """503 with Retry-After, told by /readyz too; afterwards both answer."""
     compiled = threading.Event()
-    app = create_app(settings, warm_up=lambda warmup: compiled.wait(20))
+    app = create_app(replace(settings, login=False), warm_up=lambda warmup: compiled.wait(20))
     with TestClient(app, base_url=ADDRESS) as client:
         visitor = Visitor(client)
         waiting = visitor.post("/simulations", json={})
