@@ -21,9 +21,9 @@ from ridetune.app.settings import Limits, Settings
 
 from .command_line import SHORT
 from .dask_processes import dask_processes
-from .postgresql_server import PostgresqlServer
+from .postgresql_server import on_postgresql, postgresql
 
-__all__ = ["dask_processes"]
+__all__ = ["dask_processes", "on_postgresql", "postgresql"]
 
 ADDRESS = "http://127.0.0.1:8000"
 SAMPLES = Path(__file__).parents[2] / "sample_runs"
@@ -102,21 +102,6 @@ def workers() -> Iterator[str]:
         silence_logs=logging.ERROR,
     ) as cluster:
         yield cluster.scheduler_address
-
-
-@pytest.fixture(scope="session")
-def postgresql() -> Iterator[PostgresqlServer]:
-    """A server for the tests that need one."""
-    server = PostgresqlServer()
-    yield server
-    server.close()
-
-
-@pytest.fixture
-def on_postgresql(postgresql) -> Iterator[str]:
-    """The URL of an empty database."""
-    with postgresql.database() as url:
-        yield url
 
 
 @pytest.fixture(params=["sqlite", "postgresql"])

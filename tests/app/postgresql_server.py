@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import psycopg
+import pytest
 
 MISSING = "The tests need PostgreSQL's initdb; run apt-get install postgresql."
 
@@ -77,6 +78,21 @@ class PostgresqlServer:
             **self._user,
         )
         assert done.returncode == 0, done.stderr
+
+
+@pytest.fixture(scope="session")
+def postgresql() -> Iterator[PostgresqlServer]:
+    """A server for the tests that need one."""
+    server = PostgresqlServer()
+    yield server
+    server.close()
+
+
+@pytest.fixture
+def on_postgresql(postgresql) -> Iterator[str]:
+    """The URL of an empty database."""
+    with postgresql.database() as url:
+        yield url
 
 
 def _binaries() -> Path:

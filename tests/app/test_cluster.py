@@ -1,8 +1,9 @@
-"""The seam to Dask: results, progress, cancelling, lost workers. One local cluster for all."""
+"""The seam to Dask: results, progress, cancelling, lost workers, on both kinds of cluster."""
 
 import json
 import queue
 import time
+from collections.abc import Callable
 
 import cloudpickle
 import pytest
@@ -11,7 +12,7 @@ from ridetune.app.errors import Unavailable
 from ridetune.app.worker import MOST_KEPT, Ending
 
 from . import tasks
-from .dask_processes import make_certificates
+from .dask_processes import DaskProcesses, make_certificates
 
 PATIENCE = 60.0
 
@@ -49,9 +50,15 @@ class Heard:
         return ending
 
 
-@pytest.fixture(scope="module")
-def cluster(tmp_path_factory):
-    cluster = Cluster("", tmp_path_factory.mktemp("dask"), workers=2)
+@pytest.fixture(scope="module", params=["own workers", "a scheduler elsewhere"])
+def cluster(request, tmp_path_factory):
+    """Two workers: of its own, and two that a scheduler in another process has, behind TLS."""
+    scratch = tmp_path_factory.mktemp("dask")
+    if request.param == "own workers":
+        cluster = Cluster("", scratch, workers=2)
+    else:
+        far = request.getfixturevalue("dask_processes")
+        cluster = Cluster(far.address, scratch, certificates=far.certificates)
     yield cluster
     cluster.close()
 
@@ -198,44 +205,60 @@ def test_an_idle_cluster_leaves_and_comes_back(tmp_path, heard):
         cluster.close()
 
 
-def test_the_same_seam_takes_a_scheduler_by_its_address(tmp_path, heard):
-    """Here one of our own, on loopback, started by Dask's own means."""
-    from distributed import LocalCluster
-
-    with LocalCluster(
-        n_workers=1, threads_per_worker=1, dashboard_address=None, local_directory=str(tmp_path)
-    ) as elsewhere:
-        cluster = Cluster(elsewhere.scheduler_address, tmp_path)
-        try:
-            cluster.submit("far", tasks.double, 4, heard)
-            assert heard.end_of("far")["state"] == "done"
-            cluster.submit("wait", tasks.wait, None, heard)
-            assert heard.progress.get(timeout=PATIENCE)
-            cluster.cancel("wait", grace=30.0)
-            assert heard.end_of("wait")["state"] == "cancelled"
-        finally:
-            cluster.close()
+def test_it_tells_how_wide_it_is_and_what_became_of_its_tasks(cluster, heard):
+    assert cluster.width() == 2
+    before = cluster.became.copy()
+    cluster.submit("one", tasks.double, 1, heard)
+    cluster.submit("two", tasks.refuse, 1, heard)
+    for _ in range(2):
+        heard.ends.get(timeout=PATIENCE)
+    assert cluster.became - before == {"submitted": 2, "done": 1, "failed": 1}
+    assert cluster.workers() == 2
 
 
-def test_a_scheduler_elsewhere_is_reached_with_its_certificates(tmp_path, heard, dask_processes):
-    """A scheduler and two workers that know each other by TLS; both work at once."""
-    far = dask_processes
+def test_a_scheduler_that_was_lost_is_found_again(tmp_path, heard):
+    """What ran is told to be lost, with no blame; at first nothing can be submitted, then it can,
+    and the new scheduler's tasks are heard of. Its workers end with it and are started again."""
+    folder = tmp_path / "far"
+    folder.mkdir()
+    far = DaskProcesses(folder, make_certificates(folder))
+    far.start_scheduler()
+    far.start_worker()
     cluster = Cluster(far.address, tmp_path, certificates=far.certificates)
     try:
-        cluster.submit("far", tasks.double, 4, heard)
-        ending = heard.end_of("far")
+        cluster.submit("lost", tasks.wait, None, heard)
+        assert heard.progress.get(timeout=PATIENCE)[0] == "lost"
+        far.scheduler.kill()
+        far.scheduler.wait()
+        assert heard.lost.get(timeout=PATIENCE) == ("lost", False)
+        until(lambda: is_away(cluster))
+        far.start_scheduler(port=int(far.address.rpartition(":")[2]))
+        far.start_worker()
+        until(lambda: not is_away(cluster))
+        cluster.submit("again", tasks.double, 21, heard)
+        ending = heard.end_of("again")
         assert ending["result"] is not None
-        assert ending["result"]["value"] == 8
-        for name in ("left", "right"):
-            cluster.submit(name, tasks.wait, None, heard)
-        assert {heard.started.get(timeout=PATIENCE) for _ in range(3)} == {"far", "left", "right"}
-        assert cluster.workers() == 2
-        for name in ("left", "right"):
-            cluster.cancel(name, grace=30.0)
-            assert heard.end_of(name)["state"] == "cancelled"
-        assert cluster.became == {"submitted": 3, "done": 1, "cancelled": 2}
+        assert ending["result"]["value"] == 42
+        assert {heard.started.get(timeout=PATIENCE) for _ in range(2)} == {"lost", "again"}
+        assert heard.progress.get(timeout=PATIENCE) == ("again", {"cost": 1.0})
     finally:
         cluster.close()
+        far.close()
+
+
+def is_away(cluster: Cluster) -> bool:
+    try:
+        cluster.width()
+    except Unavailable:
+        return True
+    return False
+
+
+def until(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
 
 
 def test_a_stranger_is_not_let_in(tmp_path, heard, dask_processes):

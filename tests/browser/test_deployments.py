@@ -7,7 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ..app.dask_processes import DaskProcesses, dask_processes
+from ..app.postgresql_server import on_postgresql, postgresql
 from .conftest import AWAY, SAMPLES, Service, add_file, short_run
+
+__all__ = ["dask_processes", "on_postgresql", "postgresql"]
 
 pytestmark = pytest.mark.browser
 
@@ -26,10 +30,24 @@ class Deployment:
         return Service(self.data, port, **self.environment)
 
 
-@pytest.fixture(params=["embedded"])
+@pytest.fixture(params=["embedded", "outgrown"])
 def deployment(request, tmp_path) -> Deployment:
-    """SQLite and workers of its own."""
-    return Deployment(tmp_path / "data")
+    """SQLite and workers of its own; PostgreSQL, and a scheduler and workers elsewhere by TLS."""
+    data = tmp_path / "data"
+    if request.param == "embedded":
+        return Deployment(data)
+    far: DaskProcesses = request.getfixturevalue("dask_processes")
+    files = far.certificates
+    return Deployment(
+        data,
+        {
+            "RIDETUNE_DATABASE": request.getfixturevalue("on_postgresql"),
+            "RIDETUNE_CLUSTER": far.address,
+            "RIDETUNE_CLUSTER_CA": str(files.ca),
+            "RIDETUNE_CLUSTER_CERT": str(files.certificate),
+            "RIDETUNE_CLUSTER_KEY": str(files.key),
+        },
+    )
 
 
 def test_from_an_upload_over_a_crash_to_a_redesign(visit, deployment):
