@@ -115,7 +115,7 @@ class Dispatcher:
         self._kinds = kinds
         self._changed = changed
         self._ready, self._taking = ready, taking
-        self._owner = secrets.token_hex(8)
+        self._runner = secrets.token_hex(8)
         self._active: dict[str, _Active] = {}
         self._progress: dict[str, Progress] = {}
         self._saved: dict[str, Progress] = {}
@@ -143,7 +143,7 @@ class Dispatcher:
             if thread.is_alive():
                 thread.join()
         with suppress(Unavailable):
-            self._store.jobs.release(self._owner)
+            self._store.jobs.release(self._runner)
 
     def look(self) -> None:
         """There may be a job to claim."""
@@ -235,7 +235,7 @@ class Dispatcher:
         if room <= 0 or now - self._looked < LOOK_EVERY:
             return
         self._looked = now
-        for job in self._store.jobs.claim(self._owner, room, least_priority=least):
+        for job in self._store.jobs.claim(self._runner, room, least_priority=least):
             active = _Active(job, self._kinds[job.kind], attempts=job.attempts)
             self._active[job.id] = active
             self._gatherers.submit(self._gather, active)
@@ -319,7 +319,7 @@ class Dispatcher:
     def _started(self, active: _Active) -> None:
         if not active.started:
             active.started = True
-            self._written(lambda: self._store.jobs.start(active.job.id, self._owner))
+            self._written(lambda: self._store.jobs.start(active.job.id, self._runner))
 
     def _tell(self, active: _Active, unit: str, progress: Progress) -> None:
         active.progress[unit] = progress
@@ -369,7 +369,7 @@ class Dispatcher:
                 detail = "The job's workers were lost each time it was tried."
                 self._fail(active, "worker-lost", detail)
                 return
-            self._written(lambda: self._store.jobs.requeue(active.job.id, self._owner))
+            self._written(lambda: self._store.jobs.requeue(active.job.id, self._runner))
             active.started = False
 
     def _cancel(self, job: str) -> None:
@@ -420,7 +420,7 @@ class Dispatcher:
         self._recorded = now
         for job, progress in self._progress.items():
             if self._saved.get(job) is not progress:
-                self._store.jobs.save_progress(job, self._owner, progress)
+                self._store.jobs.save_progress(job, self._runner, progress)
                 self._saved[job] = progress
 
     def _written(self, write: Callable[[], Any]) -> Any:
@@ -440,7 +440,7 @@ class Dispatcher:
             if not (known := frozenset(self._active)):
                 continue
             try:
-                beat = self._store.jobs.heartbeat(self._owner)
+                beat = self._store.jobs.heartbeat(self._runner)
             except Exception as error:
                 log.warning("leases of jobs are not renewed: %s", error)
                 continue

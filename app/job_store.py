@@ -1,11 +1,11 @@
 """Jobs as kept in the database: queued, running, done, failed or cancelled.
 
-An unfinished job is run by its owner, one service process, which renews its lease by a heartbeat;
+An unfinished job is run by its runner, one service process, which renews its lease by a heartbeat;
 once the lease has run out another one may claim it. A job may thus be run twice, and the first end
 is the end.
 
 `attempts` counts starts that ended in a lost worker. `restarts` counts those that ended because the
-owner was lost: it crashed, or its lease ran out. What an owner hands over as it stops in good order
+runner was lost: it crashed, or its lease ran out. What one hands over as it stops in good order
 counts as neither: a job must not fail for our restarts.
 """
 
@@ -38,7 +38,7 @@ from .tables import job_files, job_parts, jobs, results
 
 UNFINISHED = ("queued", "running")
 LEASE = 10.0
-"""How long a job stays its owner's after the last heartbeat, s."""
+"""How long a job stays its runner's after the last heartbeat, s."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Job:
     """One background job.
 
     spec : everything needed to run it again
-    owner : the service process that runs it
+    runner : the service process that runs it
     priority : a job with a higher one is claimed before others
     file : SHA-256 of what it made
     """
@@ -63,7 +63,7 @@ class Job:
     finished: float | None
     attempts: int
     restarts: int
-    owner: str | None
+    runner: str | None
     cancel_asked: bool
     priority: int
     result: dict[str, Any] | None = None
@@ -82,7 +82,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Beat:
-    """The ids of an owner's unfinished jobs, and of those among them that are to stop."""
+    """The ids of a runner's unfinished jobs, and of those among them that are to stop."""
 
     jobs: frozenset[str]
     cancel_asked: frozenset[str]
@@ -184,8 +184,8 @@ class JobStore:
         query = _select(*conditions).order_by(jobs.c.created)
         return [_job(row) for row in connection.execute(query)]
 
-    def claim(self, owner: str, most: int, *, least_priority: int = 0) -> list[Job]:
-        """Make unfinished jobs that nobody runs the owner's, `most` at once, those of the highest
+    def claim(self, runner: str, most: int, *, least_priority: int = 0) -> list[Job]:
+        """Make unfinished jobs that nobody runs the runner's, `most` at once, those of the highest
         priority first, then those of the session of which the fewest are run, then the oldest.
 
         Whichever of them was asked to stop is cancelled instead.
@@ -194,7 +194,7 @@ class JobStore:
         # Also where a clock went back, the lease has run out.
         lapsed = func.abs(jobs.c.heartbeat_at - now) > LEASE
         free = jobs.c.state.in_(UNFINISHED) & or_(
-            jobs.c.owner.is_(None), (jobs.c.owner != owner) & lapsed
+            jobs.c.runner.is_(None), (jobs.c.runner != runner) & lapsed
         )
         free &= jobs.c.priority >= least_priority
         with self._database.reading() as connection:
@@ -207,15 +207,15 @@ class JobStore:
             waiting = select(jobs.c.id).where(free, ~jobs.c.cancel_asked).order_by(*order)
             self._cancel(connection, _locked(connection, stopped))
             taken = _locked(connection, waiting.limit(most))
-            _take_back(connection, jobs.c.id.in_(taken), owner=owner, heartbeat_at=now)
+            _take_back(connection, jobs.c.id.in_(taken), runner=runner, heartbeat_at=now)
             query = _select(jobs.c.id.in_(taken)).order_by(*order)
             return [_job(row) for row in connection.execute(query)]
 
-    def heartbeat(self, owner: str) -> Beat:
-        """Renew the leases of an owner's jobs; which those still are."""
+    def heartbeat(self, runner: str) -> Beat:
+        """Renew the leases of a runner's jobs; which those still are."""
         with self._database.writing() as connection:
             # In one order, so that nobody who locks several of them waits in a circle.
-            held = select(jobs.c.id).where(_of(owner)).order_by(jobs.c.id).with_for_update()
+            held = select(jobs.c.id).where(_of(runner)).order_by(jobs.c.id).with_for_update()
             mine = connection.execute(held).scalars().all()
             renewed = connection.execute(
                 update(jobs)
@@ -228,47 +228,47 @@ class JobStore:
             frozenset(row.id for row in renewed if row.cancel_asked),
         )
 
-    def release(self, owner: str) -> None:
-        """Give up an owner's jobs, for the next one to claim."""
+    def release(self, runner: str) -> None:
+        """Give up a runner's jobs, for the next one to claim."""
         with self._database.writing() as connection:
-            held = select(jobs.c.id).where(_of(owner)).order_by(jobs.c.id).with_for_update()
+            held = select(jobs.c.id).where(_of(runner)).order_by(jobs.c.id).with_for_update()
             mine = connection.execute(held).scalars().all()
             asked = select(jobs.c.id).where(jobs.c.id.in_(mine), jobs.c.cancel_asked)
             self._cancel(connection, connection.execute(asked).scalars().all())
             connection.execute(
                 update(jobs)
-                .where(jobs.c.id.in_(mine), _of(owner))
-                .values(state="queued", started=None, owner=None)
+                .where(jobs.c.id.in_(mine), _of(runner))
+                .values(state="queued", started=None, runner=None)
             )
 
     def take_back_all(self) -> None:
         """Make every unfinished job claimable, where no other service can be running one."""
         with self._database.writing() as connection:
-            _take_back(connection, jobs.c.owner.is_not(None), owner=None)
+            _take_back(connection, jobs.c.runner.is_not(None), runner=None)
 
-    def start(self, job: str, owner: str) -> bool:
-        """Mark its owner's queued job as running; False if it is not queued, or not its own, any
+    def start(self, job: str, runner: str) -> bool:
+        """Mark its runner's queued job as running; False if it is not queued, or not its own, any
         more.
         """
-        return self._move(job, owner, ("queued",), state="running", started=self._database.now)
+        return self._move(job, runner, ("queued",), state="running", started=self._database.now)
 
-    def requeue(self, job: str, owner: str) -> bool:
-        """Take a job back whose worker was lost, which stays its owner's; False if it has ended
+    def requeue(self, job: str, runner: str) -> bool:
+        """Take a job back whose worker was lost, which stays its runner's; False if it has ended
         meanwhile, or is another's.
         """
         return self._move(
-            job, owner, UNFINISHED, state="queued", started=None, attempts=jobs.c.attempts + 1
+            job, runner, UNFINISHED, state="queued", started=None, attempts=jobs.c.attempts + 1
         )
 
     def ask_to_cancel(self, session: str, job: str) -> Job:
-        """Have a job's owner stop it; one that has no owner is cancelled at once."""
+        """Have a job's runner stop it; one that has no runner is cancelled at once."""
         with self._database.writing() as connection:
             mine = (jobs.c.session == session) & (jobs.c.id == job)
             connection.execute(
                 update(jobs).where(mine, jobs.c.state.in_(UNFINISHED)).values(cancel_asked=True)
             )
             unowned = select(jobs.c.id).where(
-                mine, jobs.c.state.in_(UNFINISHED), jobs.c.owner.is_(None)
+                mine, jobs.c.state.in_(UNFINISHED), jobs.c.runner.is_(None)
             )
             self._cancel(connection, connection.execute(unowned).scalars().all())
         return self.get(session, job)
@@ -307,20 +307,20 @@ class JobStore:
             connection.execute(insert(job_files).values(job=job, sha256=file))
         connection.execute(delete(job_parts).where(job_parts.c.job == job))
 
-    def save_progress(self, job: str, owner: str, progress: Mapping[str, Any]) -> None:
-        """Keep how far its owner's job has come."""
-        self._move(job, owner, UNFINISHED, progress=json.dumps(dict(progress)))
+    def save_progress(self, job: str, runner: str, progress: Mapping[str, Any]) -> None:
+        """Keep how far its runner's job has come."""
+        self._move(job, runner, UNFINISHED, progress=json.dumps(dict(progress)))
 
     def delete(self, session: str, job: str) -> None:
         """Remove a job and its result."""
         with self._database.writing() as connection:
             connection.execute(delete(jobs).where(jobs.c.session == session, jobs.c.id == job))
 
-    def _move(self, job: str, owner: str, states: tuple[str, ...], **values: Any) -> bool:
+    def _move(self, job: str, runner: str, states: tuple[str, ...], **values: Any) -> bool:
         with self._database.writing() as connection:
             moved = connection.execute(
                 update(jobs)
-                .where(jobs.c.id == job, jobs.c.owner == owner, jobs.c.state.in_(states))
+                .where(jobs.c.id == job, jobs.c.runner == runner, jobs.c.state.in_(states))
                 .values(**values)
             )
         return bool(moved.rowcount)
@@ -335,12 +335,12 @@ def _run_of_session() -> ScalarSelect[int]:
     """How many jobs of a job's session somebody runs."""
     others = jobs.alias()
     mine = (others.c.session == jobs.c.session) & others.c.state.in_(UNFINISHED)
-    query = select(func.count()).where(mine, others.c.owner.is_not(None))
+    query = select(func.count()).where(mine, others.c.runner.is_not(None))
     return query.correlate(jobs).scalar_subquery()
 
 
-def _of(owner: str) -> ColumnElement[bool]:
-    return (jobs.c.owner == owner) & jobs.c.state.in_(UNFINISHED)
+def _of(runner: str) -> ColumnElement[bool]:
+    return (jobs.c.runner == runner) & jobs.c.state.in_(UNFINISHED)
 
 
 def _locked(connection: Connection, chosen: Select[Any]) -> Sequence[str]:
@@ -349,7 +349,7 @@ def _locked(connection: Connection, chosen: Select[Any]) -> Sequence[str]:
 
 
 def _take_back(connection: Connection, chosen: ColumnElement[bool], **values: Any) -> None:
-    """Queue unfinished jobs again; those that ran have lost their owner."""
+    """Queue unfinished jobs again; those that ran have lost their runner."""
     lost = case((jobs.c.state == "running", 1), else_=0)
     connection.execute(
         update(jobs)
@@ -392,7 +392,7 @@ def _job(row: Row[Any], result: str | None = None, file: str | None = None) -> J
         finished=row.finished,
         attempts=row.attempts,
         restarts=row.restarts,
-        owner=row.owner,
+        runner=row.runner,
         cancel_asked=row.cancel_asked,
         priority=row.priority,
         result=json.loads(result) if result else None,

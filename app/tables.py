@@ -30,7 +30,7 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
     ("ALTER TABLE measurements ADD COLUMN conditioned TEXT",),
     ("ALTER TABLE sessions ADD COLUMN setup TEXT",),
     (
-        "ALTER TABLE jobs ADD COLUMN owner VARCHAR(64)",
+        "ALTER TABLE jobs ADD COLUMN runner VARCHAR(64)",
         "ALTER TABLE jobs ADD COLUMN heartbeat_at FLOAT NOT NULL DEFAULT 0",
         "ALTER TABLE jobs ADD COLUMN cancel_asked BOOLEAN NOT NULL DEFAULT FALSE",
         "ALTER TABLE jobs ADD COLUMN priority INTEGER NOT NULL DEFAULT 0",
@@ -147,7 +147,7 @@ jobs = Table(
     Column("finished", Float),
     Column("attempts", Integer, nullable=False, default=0),
     Column("restarts", Integer, nullable=False, default=0),
-    Column("owner", String(64)),
+    Column("runner", String(64)),
     Column("heartbeat_at", Float, nullable=False, default=0.0),
     Column("cancel_asked", Boolean, nullable=False, default=False),
     Column("priority", Integer, nullable=False, default=0),

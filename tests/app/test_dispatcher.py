@@ -129,7 +129,7 @@ def test_a_service_that_is_about_to_end_begins_nothing_more(team):
 def until_sent(team: Team, cluster: StandIn, task: str) -> None:
     """Until a unit is sent as others end; how many they are is for the test to say."""
     job = task.partition("/")[0]
-    until(lambda: team.store.jobs.get(team.sessions[job], job).owner is not None)
+    until(lambda: team.store.jobs.get(team.sessions[job], job).runner is not None)
     for _ in range(MEANWHILE):
         other, unit = next(name for name in cluster.tasks if "/" in name).split("/")
         make(cluster, other, unit)
@@ -245,7 +245,7 @@ def test_a_job_whose_lease_another_took_is_let_go(team):
     fit = team.submit("fit", team.ann)
     until(lambda: fit in cluster.tasks)
     with team.store.database.writing() as connection:
-        connection.execute(update(jobs).values(owner="another"))
+        connection.execute(update(jobs).values(runner="another"))
     until(lambda: fit in cluster.cancelled)
     assert team.state(fit) == "queued"
 

@@ -39,8 +39,8 @@ def queued(store: Store, session: str, priority: int = 0) -> str:
     return store.jobs.add(session, "test", spec, None, priority=priority)[0].id
 
 
-def claimed(store: Store, owner: str, most: int = 10) -> list[str]:
-    return [job.id for job in store.jobs.claim(owner, most)]
+def claimed(store: Store, runner: str, most: int = 10) -> list[str]:
+    return [job.id for job in store.jobs.claim(runner, most)]
 
 
 def test_a_job_is_claimed_once_by_priority_then_by_age(store, session):
@@ -50,7 +50,7 @@ def test_a_job_is_claimed_once_by_priority_then_by_age(store, session):
     assert claimed(store, "b") == [second]
     assert claimed(store, "a") == []
     kept = store.jobs.get(session, urgent)
-    assert (kept.owner, kept.state, kept.priority, kept.restarts) == ("a", "queued", 1, 0)
+    assert (kept.runner, kept.state, kept.priority, kept.restarts) == ("a", "queued", 1, 0)
 
 
 def test_a_later_job_is_later_although_the_clock_went_back(store, session, later):
@@ -68,7 +68,7 @@ def test_a_job_that_nobody_claims_for_long_is_not_lost(store, session, later):
 
 
 @pytest.mark.parametrize("passed", [LEASE + 1, -LEASE - 1])
-def test_a_lost_owner_s_jobs_are_taken_over_once_the_lease_has_run_out(
+def test_a_lost_runner_s_jobs_are_taken_over_once_the_lease_has_run_out(
     store, session, later, passed
 ):
     """Also where the clock went back. What had not started has not been lost; what had, has."""
@@ -97,7 +97,7 @@ def test_a_heartbeat_renews_the_lease(store, session, later):
         assert store.jobs.heartbeat("a").jobs == {job}
 
 
-def test_an_owner_that_slept_keeps_what_nobody_took(store, session, later):
+def test_a_runner_that_slept_keeps_what_nobody_took(store, session, later):
     """It is not given its own jobs a second time."""
     job = queued(store, session)
     claimed(store, "a")
@@ -107,7 +107,7 @@ def test_an_owner_that_slept_keeps_what_nobody_took(store, session, later):
     assert claimed(store, "b") == []
 
 
-def test_only_its_owner_moves_a_job_but_the_first_end_is_the_end(store, session):
+def test_only_its_runner_moves_a_job_but_the_first_end_is_the_end(store, session):
     """Who has lost a job may still be the first that is done with it: the result is the same."""
     job = queued(store, session)
     claimed(store, "a")
@@ -120,7 +120,7 @@ def test_only_its_owner_moves_a_job_but_the_first_end_is_the_end(store, session)
     assert store.jobs.get(session, job).progress == {"cost": 1.0}
     assert store.jobs.requeue(job, "a")
     kept = store.jobs.get(session, job)
-    assert (kept.state, kept.owner, kept.attempts, kept.restarts) == ("queued", "a", 1, 0)
+    assert (kept.state, kept.runner, kept.attempts, kept.restarts) == ("queued", "a", 1, 0)
     assert store.finish_job(job, "done", result={"cost": 1.0})
     assert not store.finish_job(job, "failed", error={"code": "x", "detail": "y"})
     assert store.jobs.heartbeat("a").jobs == frozenset()
@@ -132,7 +132,7 @@ def test_what_is_handed_over_counts_as_no_crash(store, session):
     store.jobs.start(job, "a")
     store.jobs.release("a")
     kept = store.jobs.get(session, job)
-    assert (kept.state, kept.owner, kept.started) == ("queued", None, None)
+    assert (kept.state, kept.runner, kept.started) == ("queued", None, None)
     assert claimed(store, "b") == [job]
     kept = store.jobs.get(session, job)
     assert (kept.restarts, kept.attempts) == (0, 0)
@@ -153,7 +153,7 @@ def test_after_a_crash_everything_is_claimable_at_once_with_sqlite(tmp_path):
     store.close()
 
 
-def test_a_job_without_an_owner_is_cancelled_at_once(store, session):
+def test_a_job_without_a_runner_is_cancelled_at_once(store, session):
     job = queued(store, session)
     assert store.jobs.ask_to_cancel(session, job).state == "cancelled"
     assert claimed(store, "a") == []
@@ -163,7 +163,7 @@ def test_a_job_without_an_owner_is_cancelled_at_once(store, session):
         store.jobs.ask_to_cancel(other, job)
 
 
-def test_an_owner_hears_with_its_heartbeat_what_is_to_stop(store, session):
+def test_a_runner_hears_with_its_heartbeat_what_is_to_stop(store, session):
     stopping, going_on = queued(store, session), queued(store, session)
     claimed(store, "a")
     assert store.jobs.ask_to_cancel(session, stopping).state == "queued"

@@ -69,7 +69,7 @@ def at_once(works: Sequence[Callable[[], Any]]) -> list[Any]:
 
 
 def test_every_job_is_claimed_exactly_once(stores):
-    """Four owners take what they get, three at a time, while more jobs come."""
+    """Four runners take what they get, three at a time, while more jobs come."""
     session, _ = stores[0].sessions.create(CAR, [])
     ended = threading.Event()
 
@@ -83,12 +83,12 @@ def test_every_job_is_claimed_exactly_once(stores):
         ended.set()
         return made
 
-    def run(owner: str, store: Store) -> list[str]:
+    def run(runner: str, store: Store) -> list[str]:
         done = []
         while not ended.is_set():
-            for job in store.jobs.claim(owner, 3):
-                assert store.jobs.start(job.id, owner)
-                assert job.id in store.jobs.heartbeat(owner).jobs
+            for job in store.jobs.claim(runner, 3):
+                assert store.jobs.start(job.id, runner)
+                assert job.id in store.jobs.heartbeat(runner).jobs
                 assert store.finish_job(job.id, "done", result={})
                 done.append(job.id)
         return done
