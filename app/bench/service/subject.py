@@ -39,12 +39,18 @@ class Visitor:
         return request(method, f"/api/sessions/{self.id}{path}", self.token, body, accept)
 
 
+UNLIMITED = {"new_sessions": 10**6, "session_simulated_seconds": 1e9, "viewers": 1000}
+
+
 class Subject:
     """A running service; `close` ends it and removes what it kept."""
 
     def __init__(self, limits: Mapping[str, float] = {}):
-        """limits : by name, in place of the service's own."""
-        self._limits = {f"RIDETUNE_LIMIT_{name.upper()}": str(n) for name, n in limits.items()}
+        """limits : by name, in place of the service's own; what one caller may do in a time is not
+        limited, as the bench calls for all.
+        """
+        told = UNLIMITED | dict(limits)
+        self._limits = {f"RIDETUNE_LIMIT_{name.upper()}": str(n) for name, n in told.items()}
         self._secret = secrets.token_hex(16)
         self._folder = tempfile.TemporaryDirectory(prefix="ridetune-bench-")
         self.port = 0
