@@ -235,7 +235,10 @@ class Dispatcher:
         if room <= 0 or now - self._looked < LOOK_EVERY:
             return
         self._looked = now
-        for job in self._store.jobs.claim(self._runner, room, least_priority=least):
+        claimed = self._store.jobs.claim(
+            self._runner, room, least_priority=least, known=tuple(self._active)
+        )
+        for job in claimed:
             active = _Active(job, self._kinds[job.kind], attempts=job.attempts)
             self._active[job.id] = active
             self._gatherers.submit(self._gather, active)

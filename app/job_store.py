@@ -11,7 +11,7 @@ counts as neither: a job must not fail for our restarts.
 
 import json
 import secrets
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -184,9 +184,19 @@ class JobStore:
         query = _select(*conditions).order_by(jobs.c.created)
         return [_job(row) for row in connection.execute(query)]
 
-    def claim(self, runner: str, most: int, *, least_priority: int = 0) -> list[Job]:
+    def claim(
+        self,
+        runner: str,
+        most: int,
+        *,
+        least_priority: int = 0,
+        known: Collection[str] | None = None,
+    ) -> list[Job]:
         """Make unfinished jobs that nobody runs the runner's, `most` at once, those of the highest
         priority first, then those of the session of which the fewest are run, then the oldest.
+
+        known : all jobs that the runner runs; another one that is its own comes again, for the
+            answer to its claim was lost
 
         Whichever of them was asked to stop is cancelled instead.
         """
@@ -194,7 +204,9 @@ class JobStore:
         # Also where a clock went back, the lease has run out.
         lapsed = func.abs(jobs.c.heartbeat_at - now) > LEASE
         free = jobs.c.state.in_(UNFINISHED) & or_(
-            jobs.c.runner.is_(None), (jobs.c.runner != runner) & lapsed
+            jobs.c.runner.is_(None),
+            (jobs.c.runner != runner) & lapsed,
+            *([] if known is None else [(jobs.c.runner == runner) & jobs.c.id.not_in(known)]),
         )
         free &= jobs.c.priority >= least_priority
         with self._database.reading() as connection:

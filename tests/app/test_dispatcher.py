@@ -267,3 +267,20 @@ def test_nothing_that_was_told_is_lost_while_the_database_is_away(team, monkeypa
     until(lambda: team.state(fit) == "done")
     assert len(refused) == 4
     assert team.store.jobs.get(team.ann, fit).result == {"cost": 1.0}
+
+
+def test_a_claim_whose_answer_was_lost_is_not_a_job_lost(team, monkeypatch):
+    """The database has committed it, but the connection broke before it could tell."""
+    claim, broken = team.store.jobs.claim, []
+
+    def claimed_unheard(*asked, **more):
+        found = claim(*asked, **more)
+        if found and not broken:
+            broken.append(found)
+            raise Unavailable("The database went away.")
+        return found
+
+    monkeypatch.setattr(team.store.jobs, "claim", claimed_unheard)
+    fit = team.submit("fit", team.ann)
+    cluster = team.dispatch()
+    until(lambda: fit in cluster.tasks)
