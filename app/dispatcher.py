@@ -11,12 +11,13 @@ begins with the parts that are kept of it.
 """
 
 import logging
+import math
 import queue
 import secrets
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -58,7 +59,9 @@ LAST = ""
 class _Active:
     """A job that this process has claimed.
 
+    gather_at : when its payload is to be gathered, s; infinite once that has begun
     payload : None until it is gathered
+    slow : whether its units hold a worker for long
     waiting : units that are not sent;  running : those that are
     kept : names of the parts
     progress : of the units
@@ -66,7 +69,9 @@ class _Active:
 
     job: Job
     kind: Kind
+    gather_at: float = 0.0
     payload: Any = None
+    slow: bool = False
     waiting: deque[str] = field(default_factory=deque)
     running: set[str] = field(default_factory=set)
     kept: set[str] = field(default_factory=set)
@@ -81,12 +86,6 @@ class _Active:
         if self.payload is None or self.running and not self.waiting:
             return None
         return self.waiting[0] if self.waiting else LAST
-
-    @property
-    def slow(self) -> bool:
-        """Whether its units hold a worker for long."""
-        division = self.kind.division
-        return division is not None and division.slow(self.job.spec)
 
 
 class Closing(Exception):
@@ -193,6 +192,7 @@ class Dispatcher:
                         self._news.get_nowait()()
                 if self._taking():
                     self._claim()
+                    self._gather_all()
                     self._send_all()
                 self._record_progress()
             except Closing:
@@ -239,16 +239,26 @@ class Dispatcher:
             self._runner, room, least_priority=least, known=tuple(self._active)
         )
         for job in claimed:
-            active = _Active(job, self._kinds[job.kind], attempts=job.attempts)
-            self._active[job.id] = active
-            self._gatherers.submit(self._gather, active)
+            self._active[job.id] = _Active(job, self._kinds[job.kind], attempts=job.attempts)
+
+    def _gather_all(self) -> None:
+        """Begin to gather what is to be gathered by now."""
+        for active in self._active.values():
+            if active.gather_at <= time.monotonic():
+                active.gather_at = math.inf
+                self._gatherers.submit(self._gather, active)
 
     def _gather(self, active: _Active) -> None:
         """In a thread of its own, because files may have to be read."""
-        job = active.job
+        job, division = active.job, active.kind.division
         try:
             with logs.about(job=job.id):
                 payload = active.kind.payload(job)
+                units = () if division is None else tuple(division.names(job.spec))
+                slow = division is not None and division.slow(job.spec)
+        except Unavailable as away:
+            log.warning("job %s waits to be gathered: %s", job.id, away)
+            self._news.put(lambda: self._gather_later(active))
         except RideError as error:
             code, detail = error.code, str(error)
             self._news.put(lambda: self._fail(active, code, detail))
@@ -257,19 +267,20 @@ class Dispatcher:
             detail = "The job could not be started; see the service's log."
             self._news.put(lambda: self._fail(active, "internal", detail))
         else:
-            self._news.put(lambda: self._gathered(active, payload))
+            self._news.put(lambda: self._gathered(active, payload, units, slow))
 
-    def _gathered(self, active: _Active, payload: Any) -> None:
+    def _gather_later(self, active: _Active) -> None:
+        active.gather_at = time.monotonic() + RETRY_AFTER
+
+    def _gathered(self, active: _Active, payload: Any, units: Sequence[str], slow: bool) -> None:
         if self._active.get(active.job.id) is not active:
             return
         for name, progress in self._written(lambda: self._store.parts(active.job.id)).items():
             if name.startswith(_KEPT_BY):
                 active.kept.add(name.removeprefix(_KEPT_BY))
                 active.progress[name.removeprefix(_KEPT_BY)] = progress
-        if (division := active.kind.division) is not None:
-            units = division.names(active.job.spec)
-            active.waiting = deque(name for name in units if name not in active.kept)
-        active.payload = payload
+        active.waiting = deque(name for name in units if name not in active.kept)
+        active.payload, active.slow = payload, slow
 
     def _send_all(self) -> None:
         """Send units while there is room; nothing while the workers cannot be reached."""

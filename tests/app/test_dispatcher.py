@@ -284,3 +284,45 @@ def test_a_claim_whose_answer_was_lost_is_not_a_job_lost(team, monkeypatch):
     fit = team.submit("fit", team.ann)
     cluster = team.dispatch()
     until(lambda: fit in cluster.tasks)
+
+
+def test_a_job_waits_for_what_it_is_gathered_from(team, monkeypatch):
+    """As while the database, or the disk with its recordings, is away."""
+    refusals = [Unavailable("It is away."), Unavailable("It is away.")]
+
+    def payload(job):
+        if refusals:
+            raise refusals.pop()
+        return dict(job.spec)
+
+    monkeypatch.setitem(KINDS, "fit", replace(KINDS["fit"], payload=payload))
+    fit = team.submit("fit", team.ann)
+    cluster = team.dispatch()
+    until(lambda: fit in cluster.tasks)
+    assert team.state(fit) == "queued"
+
+
+def test_a_job_that_cannot_be_divided_fails_alone(team, monkeypatch):
+    """As one whose spec is of another version."""
+
+    def names(spec):
+        raise ValueError("no such plant")
+
+    division = replace(CUT, names=names)
+    monkeypatch.setitem(KINDS, "sweep", replace(KINDS["sweep"], division=division))
+    cluster = team.dispatch()
+    bad, fit = team.submit("sweep", team.ann, "ab"), team.submit("fit", team.ann)
+    until(lambda: team.state(bad) == "failed")
+    until(lambda: fit in cluster.tasks)
+
+
+def test_a_job_of_which_nobody_knows_how_slow_it_is_fails_alone(team, monkeypatch):
+    def slow(spec):
+        raise ValueError("no such plant")
+
+    division = replace(CUT, slow=slow)
+    monkeypatch.setitem(KINDS, "campaign", replace(KINDS["campaign"], division=division))
+    cluster = team.dispatch()
+    bad, good = team.submit("campaign", team.ann, "ab"), team.submit("sweep", team.ann, "ab")
+    until(lambda: team.state(bad) == "failed")
+    until(lambda: f"{good}/a" in cluster.tasks)
