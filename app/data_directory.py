@@ -118,6 +118,11 @@ class DataDirectory:
         """Place of an original."""
         return place_of_original(self.path, sha256)
 
+    def lacks(self, sha256: str) -> bool:
+        """Whether an original is not there, although its folder is."""
+        place = self.original(sha256)
+        return not place.exists() and place.parent.is_dir()
+
     def keep(self, sha256: str, data: bytes) -> None:
         """Write an original so that it survives a power cut, unless it is there."""
         place = self.original(sha256)

@@ -320,7 +320,8 @@ class Dispatcher:
                 assert kind.division is not None
                 task, payload = kind.division.unit, {**payload, "unit": unit}
         except NotFound:
-            # It has ended elsewhere, and its parts went with it.
+            # It has ended elsewhere, and its parts went with it; or it is ours still, a part is
+            # lost, and it is claimed again with the others.
             self._let_go(active)
             return
         self._cluster.submit(

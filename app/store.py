@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import insert, select
+from sqlalchemy import delete, insert, select
 
 from .browser_store import BrowserStore
 from .data_directory import DataDirectory, database_of
@@ -112,15 +112,19 @@ class Store:
         return {row.name: json.loads(row.progress) for row in sorted(rows)}
 
     def part(self, job: str, name: str) -> bytes:
-        """What is kept of a job under a name; `NotFound` once it has ended."""
+        """What is kept of a job under a name; `NotFound` once it has ended, or where the disk has
+        lost the part, which is no part any more then: it can be made again.
+        """
+        mine = (job_parts.c.job == job) & (job_parts.c.name == name)
         with self.database.reading() as connection:
-            sha256 = connection.execute(
-                select(job_parts.c.sha256).where(job_parts.c.job == job, job_parts.c.name == name)
-            ).scalar_one_or_none()
-        if sha256 is None:
-            raise NotFound(f"There is no part {name} of the job {job} any more.")
+            sha256 = connection.execute(select(job_parts.c.sha256).where(mine)).scalar_one_or_none()
         with files_in_a_sentence():
-            return self.directory.original(sha256).read_bytes()
+            if sha256 is not None and not self.directory.lacks(sha256):
+                return self.directory.original(sha256).read_bytes()
+        if sha256 is not None:
+            with self.database.writing() as connection:
+                connection.execute(delete(job_parts).where(mine))
+        raise NotFound(f"There is no part {name} of the job {job} any more.")
 
     def delete_job(self, session: str, job: str) -> None:
         """Remove a job with its result, its file and its parts."""

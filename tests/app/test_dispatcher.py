@@ -326,3 +326,16 @@ def test_a_job_of_which_nobody_knows_how_slow_it_is_fails_alone(team, monkeypatc
     bad, good = team.submit("campaign", team.ann, "ab"), team.submit("sweep", team.ann, "ab")
     until(lambda: team.state(bad) == "failed")
     until(lambda: f"{good}/a" in cluster.tasks)
+
+
+def test_a_part_that_the_disk_lost_is_made_again(team):
+    cluster = team.dispatch()
+    job = team.submit("sweep", team.ann, "ab")
+    make(cluster, job, "a")
+    until(lambda: len(team.store.parts(job)) == 1)
+    for name in list(team.store.directory.names()):
+        team.store.directory.drop(name)
+    make(cluster, job, "b")
+    make(cluster, job, "a")
+    until(lambda: job in cluster.tasks)
+    assert cluster.kept[job] == {"a": b"a", "b": b"b"}
