@@ -9,6 +9,7 @@ Dask forgets everything with its scheduler; what must last is the caller's busin
 
 import logging
 import os
+import secrets
 import threading
 import time
 import warnings
@@ -64,6 +65,7 @@ class Listener(Protocol):
 @dataclass
 class _Task:
     listener: Listener
+    key: str
     future: Any = None
     address: str = ""
     process: int = 0
@@ -90,6 +92,7 @@ class Cluster:
         self._lock = threading.RLock()
         self._tasks: dict[str, _Task] = {}
         self._submissions = 0
+        self._token = secrets.token_hex(4)
         self._client: Any = None
         self._scheduler, self._there, self._looked = "", 0, 0.0
         self._local: Any = None
@@ -134,17 +137,20 @@ class Cluster:
             client = self._started()
             self._submissions += 1
             self.became["submitted"] += 1
-            known = self._tasks[name] = _Task(listener)
+            # Of this service alone: another may have the same task at the same scheduler.
+            key = f"{name}-{self._token}-{self._submissions}"
+            known = self._tasks[name] = _Task(listener, key)
             with warnings.catch_warnings():
                 # Recordings travel with their task so that a lost worker costs nothing but time.
                 warnings.filterwarnings("ignore", "Sending large graph", UserWarning)
                 future = client.submit(
                     worker.run,
                     name,
+                    key,
                     task,
                     payload,
                     dict(kept or {}),
-                    key=f"{name}-{self._submissions}",
+                    key=key,
                     pure=False,
                     priority=priority,
                 )
@@ -159,7 +165,7 @@ class Cluster:
                 return
             task.cancelled = True
             client = self._client
-        _run(client, worker.ask_to_stop, name)
+        _run(client, worker.ask_to_stop, task.key)
         if task.address:
             timer = threading.Timer(grace, self._kill, (name,))
             timer.daemon = True
@@ -173,7 +179,7 @@ class Cluster:
             self._closed = True
             if self._client is not None and self._tasks:
                 # A worker that still computes would hold up the end for seconds.
-                _run(self._client, worker.ask_to_stop, *self._tasks)
+                _run(self._client, worker.ask_to_stop, *(task.key for task in self._tasks.values()))
             self._stop()
 
     def _started(self) -> Any:
@@ -263,7 +269,7 @@ class Cluster:
     def _heard(self, event: tuple[float, dict[str, Any]]) -> None:
         news = event[1]
         task = self._tasks.get(news["task"])
-        if task is None:
+        if task is None or task.key != news["key"]:
             return
         if "process" in news:
             task.address, task.process = news["address"], news["process"]

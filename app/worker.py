@@ -74,8 +74,11 @@ class Ending(TypedDict):
     file: NotRequired[bytes]
 
 
-def run(name: str, task: Task, payload: Any, kept: Mapping[str, bytes]) -> Ending:
-    """Run a task to its end; unknown exceptions go to the scheduler as they are."""
+def run(name: str, key: str, task: Task, payload: Any, kept: Mapping[str, bytes]) -> Ending:
+    """Run a task to its end; unknown exceptions go to the scheduler as they are.
+
+    key : stands for this submission of the task, of all there are
+    """
     from distributed import get_worker
 
     logs.configure_worker()
@@ -85,7 +88,7 @@ def run(name: str, task: Task, payload: Any, kept: Mapping[str, bytes]) -> Endin
     reported = 0.0
 
     def send(**news: Any) -> None:
-        worker.log_event(TOPIC, {"task": name, **news})
+        worker.log_event(TOPIC, {"task": name, "key": key, **news})
 
     def report(now: Mapping[str, Any]) -> None:
         nonlocal progress, reported
@@ -104,7 +107,7 @@ def run(name: str, task: Task, payload: Any, kept: Mapping[str, bytes]) -> Endin
 
     send(address=worker.address, process=os.getpid())
     try:
-        attempt = Attempt(report, lambda: name in _asked_to_stop, keep, kept)
+        attempt = Attempt(report, lambda: key in _asked_to_stop, keep, kept)
         with logs.about(**about(name)):
             found = task(payload, attempt)
         if isinstance(found, WithFile):
@@ -117,7 +120,7 @@ def run(name: str, task: Task, payload: Any, kept: Mapping[str, bytes]) -> Endin
     except RideError as error:
         return ending("failed", error={"code": error.code, "detail": str(error)})
     finally:
-        _asked_to_stop.discard(name)
+        _asked_to_stop.discard(key)
 
 
 def about(name: str) -> dict[str, str]:
@@ -126,9 +129,9 @@ def about(name: str) -> dict[str, str]:
     return {"job": job, "unit": unit} if unit else {"job": job}
 
 
-def ask_to_stop(*names: str) -> None:
-    """Raise the flags of tasks, in the process that runs them."""
-    _asked_to_stop.update(names)
+def ask_to_stop(*keys: str) -> None:
+    """Raise the flags of submissions, in the process that runs them."""
+    _asked_to_stop.update(keys)
 
 
 def kill(process: int) -> None:

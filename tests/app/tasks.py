@@ -95,3 +95,12 @@ def die_once(payload, attempt):
 def kept(payload, attempt):
     """Tell what is kept."""
     return {name: data.hex() for name, data in attempt.kept.items()}
+
+
+def asked(payload, attempt):
+    """Wait for a file; whether this was asked to stop by then."""
+    attempt.report({"cost": 1.0})
+    until = time.monotonic() + 60
+    while not os.path.exists(payload) and time.monotonic() < until:
+        time.sleep(0.005)
+    return {"asked": attempt.cancelled()}

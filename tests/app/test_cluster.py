@@ -246,6 +246,25 @@ def test_a_scheduler_that_was_lost_is_found_again(tmp_path, heard):
         far.close()
 
 
+def test_what_one_service_stops_is_not_what_another_runs(tmp_path, heard, dask_processes):
+    """The same task of both, on one scheduler, as when a lease was lost: each hears of its own."""
+    far, other, goes_on = dask_processes, Heard(), tmp_path / "goes on"
+    clusters = [Cluster(far.address, tmp_path, certificates=far.certificates) for _ in range(2)]
+    try:
+        clusters[0].submit("shared", tasks.wait, None, heard)
+        heard.progress.get(timeout=PATIENCE)
+        clusters[1].submit("shared", tasks.asked, str(goes_on), other)
+        other.progress.get(timeout=PATIENCE)
+        clusters[0].cancel("shared", grace=30.0)
+        assert heard.end_of("shared")["state"] == "cancelled"
+        goes_on.touch()
+        assert other.end_of("shared")["result"] == {"asked": False}
+        assert other.started.qsize() == heard.started.qsize() == 1
+    finally:
+        for one in clusters:
+            one.close()
+
+
 def is_away(cluster: Cluster) -> bool:
     try:
         cluster.width()
