@@ -352,7 +352,11 @@ class Dispatcher:
 
     def _ended(self, active: _Active, unit: str, ending: Ending) -> None:
         active.running.discard(unit)
-        if unit == LAST:
+        if ending["state"] == "cancelled" and not active.cancelled:
+            # Nobody asked it to stop, as long as the job is ours.
+            if unit != LAST:
+                active.waiting.appendleft(unit)
+        elif unit == LAST:
             self._finish(
                 active,
                 ending["state"],
@@ -367,8 +371,6 @@ class Dispatcher:
             progress = ending["result"] or {}
             self._keep(active, unit, ending.get("file", b""), progress)
             self._tell(active, unit, progress)
-        elif not active.cancelled:
-            active.waiting.appendleft(unit)
         self._conclude(active)
 
     def _lost(self, active: _Active, unit: str, with_worker: bool) -> None:

@@ -339,3 +339,12 @@ def test_a_part_that_the_disk_lost_is_made_again(team):
     make(cluster, job, "a")
     until(lambda: job in cluster.tasks)
     assert cluster.kept[job] == {"a": b"a", "b": b"b"}
+
+
+def test_a_task_that_stops_although_nobody_asked_is_sent_again(team):
+    cluster = team.dispatch()
+    fit = team.submit("fit", team.ann)
+    until(lambda: fit in cluster.tasks)
+    cluster.end(fit, "cancelled")
+    until(lambda: fit in cluster.tasks)
+    assert team.state(fit) == "queued"
