@@ -81,6 +81,11 @@ class _Active:
     cancelled: bool = False
 
     @property
+    def cut_short(self) -> bool:
+        """Whether a result is made of its parts although it is cancelled."""
+        return self.kind.division is not None and self.kind.division.cut_short
+
+    @property
     def next(self) -> str | None:
         """The unit to be sent next, if there is one."""
         if self.payload is None or self.running and not self.waiting:
@@ -279,8 +284,10 @@ class Dispatcher:
             if name.startswith(_KEPT_BY):
                 active.kept.add(name.removeprefix(_KEPT_BY))
                 active.progress[name.removeprefix(_KEPT_BY)] = progress
-        active.waiting = deque(name for name in units if name not in active.kept)
+        if not active.cancelled:
+            active.waiting = deque(name for name in units if name not in active.kept)
         active.payload, active.slow = payload, slow
+        self._conclude(active)
 
     def _send_all(self) -> None:
         """Send units while there is room; nothing while the workers cannot be reached."""
@@ -395,15 +402,17 @@ class Dispatcher:
             return
         active.cancelled = True
         active.waiting.clear()
-        self._stop(active)
+        if not (active.cut_short and LAST in active.running):
+            self._stop(active)
         self._conclude(active)
 
     def _conclude(self, active: _Active) -> None:
-        """End a job that is cancelled once nothing of it runs."""
+        """End a job that is cancelled once nothing of it runs, and it is known that no result is
+        made of its parts.
+        """
         if not active.cancelled or active.running or active.job.id not in self._active:
             return
-        division = active.kind.division
-        if division is None or not division.cut_short or not active.kept:
+        if not active.cut_short or active.payload is not None and not active.kept:
             self._finish(active, "cancelled", progress=self._progress.get(active.job.id))
 
     def _fail(self, active: _Active, code: str, detail: str) -> None:

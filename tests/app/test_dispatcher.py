@@ -1,6 +1,7 @@
 """Which job runs when, what is kept of it, and who goes on with it; the cluster is a stand-in."""
 
 from dataclasses import replace
+from threading import Event
 
 import pytest
 from ridetune.app import dispatcher as module
@@ -348,3 +349,40 @@ def test_a_task_that_stops_although_nobody_asked_is_sent_again(team):
     cluster.end(fit, "cancelled")
     until(lambda: fit in cluster.tasks)
     assert team.state(fit) == "queued"
+
+
+def test_a_campaign_cancelled_before_it_is_gathered_has_the_drives_that_are_kept(team, monkeypatch):
+    """Kept by a service that ended; the next has claimed it, and reads files yet."""
+    first = team.dispatch()
+    job = team.submit("campaign", team.ann, "abcd")
+    make(first, job, "a")
+    until(lambda: len(team.store.parts(job)) == 1)
+    team.dispatchers.pop().close()
+    gathering = Event()
+
+    def payload(job):
+        gathering.wait(10)
+        return dict(job.spec)
+
+    monkeypatch.setitem(KINDS, "campaign", replace(KINDS["campaign"], payload=payload))
+    second = team.dispatch()
+    until(lambda: team.store.jobs.get(team.ann, job).runner is not None)
+    team.dispatchers[0].cancel(job)
+    gathering.set()
+    until(lambda: job in second.tasks)
+    assert second.kept[job] == {"a": b"a"}
+
+
+def test_a_campaign_cancelled_while_its_result_is_made_keeps_it(team):
+    cluster = team.dispatch()
+    job = team.submit("campaign", team.ann, "a")
+    make(cluster, job, "a")
+    until(lambda: job in cluster.tasks)
+    fit = team.submit("fit", team.bob)
+    until(lambda: fit in cluster.tasks)
+    for one in (job, fit):
+        team.dispatchers[0].cancel(one)
+    until(lambda: fit in cluster.cancelled)
+    assert cluster.cancelled == [fit]
+    cluster.end(job, "done", result={"files": 1})
+    until(lambda: team.state(job) == "done")
