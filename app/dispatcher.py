@@ -28,7 +28,7 @@ from ..engine.errors import RideError
 from . import logs
 from .cluster import Cluster
 from .errors import NotFound, Unavailable
-from .job_kinds import PATIENT, PROMPT, Kind, Progress
+from .job_kinds import PROMPT, Kind, Progress
 from .job_store import Beat, Job
 from .store import Store
 from .worker import Ending
@@ -47,7 +47,9 @@ RETRY_AFTER = 2.0
 """Time after which a cluster or a database that is away is tried again, s."""
 
 AHEAD = 2
-"""Jobs claimed for each task that runs at a time, and as many of those that a person waits for."""
+"""Jobs claimed for each task that runs at a time, as many of those that a person waits for, and as
+many of sessions that have none among them.
+"""
 
 GATHERERS = 2
 
@@ -233,17 +235,24 @@ class Dispatcher:
 
     def _claim(self) -> None:
         """Take as many jobs as keep the cluster busy, and have their payloads gathered."""
-        room, least = AHEAD * self._width - len(self._active), PATIENT
-        if room <= 0:
-            room, least = room + AHEAD * self._width, PROMPT
-        now = time.monotonic()
-        if room <= 0 or now - self._looked < LOOK_EVERY:
+        now, share = time.monotonic(), AHEAD * self._width
+        if now - self._looked < LOOK_EVERY:
             return
         self._looked = now
-        claimed = self._store.jobs.claim(
-            self._runner, room, least_priority=least, known=tuple(self._active)
-        )
-        for job in claimed:
+        if len(self._active) < share:
+            self._claim_up_to(share)
+            return
+        self._claim_up_to(2 * share, least_priority=PROMPT)
+        running = {active.job.session for active in self._active.values()}
+        self._claim_up_to(3 * share, other_than=running)
+
+    def _claim_up_to(self, most: int, **of: Any) -> None:
+        if (room := most - len(self._active)) <= 0:
+            return
+        known = tuple(self._active)
+        for job in self._store.jobs.claim(
+            self._runner, room, kinds=self._kinds.keys(), known=known, **of
+        ):
             self._active[job.id] = _Active(job, self._kinds[job.kind], attempts=job.attempts)
 
     def _gather_all(self) -> None:

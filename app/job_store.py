@@ -190,13 +190,17 @@ class JobStore:
         most: int,
         *,
         least_priority: int = 0,
+        kinds: Collection[str] | None = None,
         known: Collection[str] | None = None,
+        other_than: Collection[str] = (),
     ) -> list[Job]:
         """Make unfinished jobs that nobody runs the runner's, `most` at once, those of the highest
         priority first, then those of the session of which the fewest are run, then the oldest.
 
+        kinds : that the runner knows; all without
         known : all jobs that the runner runs; another one that is its own comes again, for the
             answer to its claim was lost
+        other_than : sessions of which none is claimed
 
         Whichever of them was asked to stop is cancelled instead.
         """
@@ -208,7 +212,9 @@ class JobStore:
             (jobs.c.runner != runner) & lapsed,
             *([] if known is None else [(jobs.c.runner == runner) & jobs.c.id.not_in(known)]),
         )
-        free &= jobs.c.priority >= least_priority
+        free &= (jobs.c.priority >= least_priority) & jobs.c.session.not_in(other_than)
+        if kinds is not None:
+            free &= jobs.c.kind.in_(kinds)
         with self._database.reading() as connection:
             # Mostly there is none, and nobody's writing is held up.
             if connection.execute(select(jobs.c.id).where(free).limit(1)).first() is None:

@@ -386,3 +386,20 @@ def test_a_campaign_cancelled_while_its_result_is_made_keeps_it(team):
     assert cluster.cancelled == [fit]
     cluster.end(job, "done", result={"files": 1})
     until(lambda: team.state(job) == "done")
+
+
+def test_a_session_is_not_kept_waiting_by_the_many_jobs_of_another(team):
+    cluster = team.dispatch()
+    for _ in range(4 * WIDTH):
+        team.submit("sweep", team.ann, "abcdefgh")
+    until(lambda: len(cluster.tasks) == WIDTH)
+    until_sent(team, cluster, f"{team.submit('sweep', team.bob, 'x')}/x")
+
+
+def test_a_job_of_a_kind_unknown_here_is_left_to_who_knows_it(team):
+    """As of another version that shares the database."""
+    later = team.store.jobs.add(team.ann, "later", {"asked": ""}, None, priority=9)[0].id
+    cluster = team.dispatch()
+    fit = team.submit("fit", team.ann)
+    until(lambda: fit in cluster.tasks)
+    assert team.store.jobs.get(team.ann, later).runner is None
