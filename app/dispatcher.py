@@ -254,6 +254,8 @@ class Dispatcher:
             self._runner, room, kinds=self._kinds.keys(), known=known, **of
         ):
             self._active[job.id] = _Active(job, self._kinds[job.kind], attempts=job.attempts)
+            if job.cancel_asked:
+                self._cancel(job.id)
 
     def _gather_all(self) -> None:
         """Begin to gather what is to be gathered by now."""

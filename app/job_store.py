@@ -23,6 +23,7 @@ from sqlalchemy import (
     Select,
     case,
     delete,
+    exists,
     func,
     insert,
     or_,
@@ -202,7 +203,8 @@ class JobStore:
             answer to its claim was lost
         other_than : sessions of which none is claimed
 
-        Whichever of them was asked to stop is cancelled instead.
+        Whichever of them was asked to stop is cancelled instead, unless there are parts of it, of
+        which its runner may make a result.
         """
         now = self._database.now
         # Also where a clock went back, the lease has run out.
@@ -220,9 +222,10 @@ class JobStore:
             if connection.execute(select(jobs.c.id).where(free).limit(1)).first() is None:
                 return []
         with self._database.writing() as connection:
-            stopped = select(jobs.c.id).where(free, jobs.c.cancel_asked)
-            order = (jobs.c.priority.desc(), _run_of_session(), jobs.c.created, jobs.c.id)
-            waiting = select(jobs.c.id).where(free, ~jobs.c.cancel_asked).order_by(*order)
+            stopped = select(jobs.c.id).where(free, _to_cancel())
+            urgency = jobs.c.cancel_asked.desc(), jobs.c.priority.desc()
+            order = (*urgency, _run_of_session(), jobs.c.created, jobs.c.id)
+            waiting = select(jobs.c.id).where(free, ~_to_cancel()).order_by(*order)
             self._cancel(connection, _locked(connection, stopped))
             taken = _locked(connection, waiting.limit(most))
             _take_back(connection, jobs.c.id.in_(taken), runner=runner, heartbeat_at=now)
@@ -251,7 +254,7 @@ class JobStore:
         with self._database.writing() as connection:
             held = select(jobs.c.id).where(_of(runner)).order_by(jobs.c.id).with_for_update()
             mine = connection.execute(held).scalars().all()
-            asked = select(jobs.c.id).where(jobs.c.id.in_(mine), jobs.c.cancel_asked)
+            asked = select(jobs.c.id).where(jobs.c.id.in_(mine), _to_cancel())
             self._cancel(connection, connection.execute(asked).scalars().all())
             connection.execute(
                 update(jobs)
@@ -279,14 +282,14 @@ class JobStore:
         )
 
     def ask_to_cancel(self, session: str, job: str) -> Job:
-        """Have a job's runner stop it; one that has no runner is cancelled at once."""
+        """Have a job's runner stop it; one that has no runner and no parts is cancelled at once."""
         with self._database.writing() as connection:
             mine = (jobs.c.session == session) & (jobs.c.id == job)
             connection.execute(
                 update(jobs).where(mine, jobs.c.state.in_(UNFINISHED)).values(cancel_asked=True)
             )
             unowned = select(jobs.c.id).where(
-                mine, jobs.c.state.in_(UNFINISHED), jobs.c.runner.is_(None)
+                mine, _to_cancel(), jobs.c.state.in_(UNFINISHED), jobs.c.runner.is_(None)
             )
             self._cancel(connection, connection.execute(unowned).scalars().all())
         return self.get(session, job)
@@ -347,6 +350,11 @@ class JobStore:
         values = {"state": "cancelled", "finished": self._database.now}
         connection.execute(update(jobs).where(jobs.c.id.in_(chosen)).values(**values))
         connection.execute(delete(job_parts).where(job_parts.c.job.in_(chosen)))
+
+
+def _to_cancel() -> ColumnElement[bool]:
+    """Whether a job was asked to stop of which no runner has anything to keep."""
+    return jobs.c.cancel_asked & ~exists().where(job_parts.c.job == jobs.c.id)
 
 
 def _run_of_session() -> ScalarSelect[int]:

@@ -403,3 +403,33 @@ def test_a_job_of_a_kind_unknown_here_is_left_to_who_knows_it(team):
     fit = team.submit("fit", team.ann)
     until(lambda: fit in cluster.tasks)
     assert team.store.jobs.get(team.ann, later).runner is None
+
+
+@pytest.mark.parametrize("asked", ["before", "after"])
+def test_a_campaign_cancelled_as_its_service_ends_has_the_drives_that_are_kept(team, asked):
+    first = team.dispatch()
+    job = team.submit("campaign", team.ann, "abcd")
+    make(first, job, "a")
+    until(lambda: len(team.store.parts(job)) == 1)
+    if asked == "before":
+        team.taking = False
+        team.store.jobs.ask_to_cancel(team.ann, job)
+    team.dispatchers.pop().close()
+    if asked == "after":
+        team.store.jobs.ask_to_cancel(team.ann, job)
+    team.taking = True
+    second = team.dispatch()
+    until(lambda: job in second.tasks)
+    assert second.kept[job] == {"a": b"a"}
+
+
+def test_a_sweep_cancelled_without_a_service_ends_with_the_next(team):
+    first = team.dispatch()
+    job = team.submit("sweep", team.ann, "abcd")
+    make(first, job, "a")
+    until(lambda: len(team.store.parts(job)) == 1)
+    team.dispatchers.pop().close()
+    team.store.jobs.ask_to_cancel(team.ann, job)
+    team.dispatch()
+    until(lambda: team.state(job) == "cancelled")
+    assert team.store.parts(job) == {}

@@ -163,6 +163,14 @@ def test_a_job_without_a_runner_is_cancelled_at_once(store, session):
         store.jobs.ask_to_cancel(other, job)
 
 
+def test_a_job_with_parts_is_left_to_a_runner_to_be_cancelled(store, session):
+    """Which may make a result of them; before what is to be run."""
+    waiting, job = queued(store, session), queued(store, session)
+    store.keep_part(job, "a", b"part")
+    assert not store.jobs.ask_to_cancel(session, job).ended
+    assert claimed(store, "a") == [job, waiting]
+
+
 def test_a_runner_hears_with_its_heartbeat_what_is_to_stop(store, session):
     stopping, going_on = queued(store, session), queued(store, session)
     claimed(store, "a")
@@ -220,9 +228,8 @@ def test_parts_go_with_their_job_however_it_goes(store, session, end):
     if end == "deleted":
         store.delete_job(session, job)
     elif end == "cancelled":
-        store.jobs.ask_to_cancel(session, job)
+        store.finish_job(job, "cancelled")
         assert store.parts(job) == {}
-        store.finish_job(queued(store, session), "failed")
     else:
         store.sessions.delete(session)
     assert originals(store) == set()
