@@ -49,7 +49,7 @@ class Service:
     def start(self) -> float:
         """Start; seconds until it is ready."""
         began = time.monotonic()
-        options = ["serve", "--port", str(self.port), "--data", str(self.data)]
+        options = ["serve", "--no-login", "--port", str(self.port), "--data", str(self.data)]
         self._process = subprocess.Popen(
             [sys.executable, "-c", SERVE, *options],
             env=self._environment,
