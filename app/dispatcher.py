@@ -67,6 +67,7 @@ class _Active:
     waiting : units that are not sent;  running : those that are
     kept : names of the parts
     progress : of the units
+    lost : how often a unit went with its worker
     """
 
     job: Job
@@ -78,7 +79,7 @@ class _Active:
     running: set[str] = field(default_factory=set)
     kept: set[str] = field(default_factory=set)
     progress: dict[str, Progress] = field(default_factory=dict)
-    attempts: int = 0
+    lost: Counter[str] = field(default_factory=Counter)
     started: bool = False
     cancelled: bool = False
 
@@ -253,7 +254,9 @@ class Dispatcher:
         for job in self._store.jobs.claim(
             self._runner, room, kinds=self._kinds.keys(), known=known, **of
         ):
-            self._active[job.id] = _Active(job, self._kinds[job.kind], attempts=job.attempts)
+            active = self._active[job.id] = _Active(job, self._kinds[job.kind])
+            if active.kind.division is None:
+                active.lost[LAST] = job.attempts
             if job.cancel_asked:
                 self._cancel(job.id)
 
@@ -399,8 +402,8 @@ class Dispatcher:
         if unit != LAST:
             active.waiting.appendleft(unit)
         if with_worker:
-            active.attempts += 1
-            if active.attempts >= MOST_ATTEMPTS:
+            active.lost[unit] += 1
+            if active.lost[unit] >= MOST_ATTEMPTS:
                 detail = "The job's workers were lost each time it was tried."
                 self._fail(active, "worker-lost", detail)
                 return

@@ -433,3 +433,18 @@ def test_a_sweep_cancelled_without_a_service_ends_with_the_next(team):
     team.dispatch()
     until(lambda: team.state(job) == "cancelled")
     assert team.store.parts(job) == {}
+
+
+def test_units_that_are_lost_now_and_then_do_not_fail_their_job(team):
+    """A long job outlives many workers; it is a unit lost each time that may be the reason."""
+    cluster = team.dispatch()
+    job = team.submit("sweep", team.ann, "abcd")
+    for unit in "abc":
+        until(lambda: f"{job}/{unit}" in cluster.tasks)
+        cluster.lose(f"{job}/{unit}", with_worker=True)
+        make(cluster, job, unit)
+    for _ in range(module.MOST_ATTEMPTS):
+        assert team.state(job) != "failed"
+        until(lambda: f"{job}/d" in cluster.tasks)
+        cluster.lose(f"{job}/d", with_worker=True)
+    until(lambda: team.state(job) == "failed")
