@@ -48,8 +48,10 @@ def main() -> int:
         place = Path(folder)
         print("Computing every result once, undisturbed.", flush=True)
         undisturbed = Service(place / "undisturbed")
-        reference = Reference(undisturbed)
-        undisturbed.stop()
+        try:
+            reference = Reference(undisturbed)
+        finally:
+            undisturbed.stop()
         cluster = Cluster(place) if options.cluster else None
         service = Service(place / "data", database=options.database, cluster=cluster)
         try:
