@@ -55,6 +55,19 @@ def test_who_was_not_let_in_gets_nothing_but_a_page_that_says_what_to_do(client,
     assert not client.cookies
 
 
+@pytest.mark.parametrize(
+    ("path", "status"),
+    [("/api/roads/preview", 403), ("/api/sessions/0123456789abcdef/simulations", 404)],
+)
+def test_nothing_is_read_of_who_was_not_let_in(client, monkeypatch, path, status):
+    """4 MB of JSON are most of a second's work, which nobody should do for a stranger."""
+    read = []
+    monkeypatch.setattr("ridetune.app.strict_json.loads", read.append)
+    assert client.post(path, json={}).status_code == status
+    assert client.post(path, content=b"").status_code == status
+    assert read == []
+
+
 def test_whether_the_service_runs_is_told_to_everybody(client):
     for path in ("/healthz", "/readyz", "/static/style.css"):
         assert client.get(path).status_code == 200
