@@ -3,11 +3,11 @@
 from collections.abc import AsyncIterator, Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Request
 from fastapi.sse import EventSourceResponse, ServerSentEvent
-from starlette.concurrency import run_in_threadpool
 
 from .access import SessionId, session_of
 from .errors import NotFound
@@ -103,8 +103,8 @@ def job_router(name: str, view: View) -> APIRouter:
         """The job's state now, then every change of state and progress, until its final state."""
         state, progress = None, known.progress
         try:
-            async for job in services.jobs.follow(sid, known.id):
-                await run_in_threadpool(session_of, request, sid)
+            theirs = partial(session_of, request, sid)
+            async for job in services.jobs.follow(sid, known.id, theirs):
                 if job.progress != progress and job.progress:
                     progress = job.progress
                     yield ServerSentEvent(event="progress", data=clean(progress))

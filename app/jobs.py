@@ -13,6 +13,7 @@ from typing import Any
 
 from .cluster import Cluster
 from .dispatcher import Dispatcher
+from .errors import Unavailable
 from .job_kinds import Kind
 from .job_store import Job
 from .store import Store
@@ -90,17 +91,28 @@ class Jobs:
         for job in self._store.jobs.unfinished(session):
             self._stop(job)
 
-    async def follow(self, session: str, job: str) -> AsyncIterator[Job]:
-        """The job as it stands, then again after each change, until its final state."""
+    async def follow(
+        self, session: str, job: str, require: Callable[[], object] = lambda: None
+    ) -> AsyncIterator[Job]:
+        """The job as it stands, then again after each change, until its final state; nothing while
+        the database is away. Before each look `require` may refuse.
+        """
+
+        def look() -> Job | None:
+            with suppress(Unavailable):
+                require()
+                return self.get(session, job)
+
         changed = asyncio.Event()
         self._followers.setdefault(job, set()).add(changed)
         try:
             while True:
                 changed.clear()
-                now = await asyncio.to_thread(self.get, session, job)
-                yield now
-                if now.ended:
-                    return
+                now = await asyncio.to_thread(look)
+                if now is not None:
+                    yield now
+                    if now.ended:
+                        return
                 with suppress(TimeoutError):
                     await asyncio.wait_for(changed.wait(), POLL_EVERY)
         finally:

@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator
 import pytest
 from fastapi.testclient import TestClient
 from ridetune.app.errors import Unavailable
+from ridetune.app.job_store import JobStore
+from ridetune.app.owner_store import OwnerStore
 
 from .conftest import Visitor, open_client
 
@@ -220,6 +222,35 @@ def test_followers_hear_every_change_and_leave_nothing_behind(service, owner, cl
     assert "running" in seen
     assert seen[-1] == "done"
     assert jobs._followers == {}
+
+
+def test_followers_wait_for_a_database_that_is_away(service, owner, clusters, monkeypatch):
+    """Whether it cannot tell how the job stands or whose it is."""
+    monkeypatch.setattr("ridetune.app.jobs.POLL_EVERY", 0.01)
+    job = submit(owner)["id"]
+    assert owner.post(f"/identifications/{job}/cancel").status_code == 202
+    away = [Unavailable("It is away.") for _ in range(4)]
+    opens, get = OwnerStore.opens, JobStore.get
+
+    def meanwhile(usual, calls):
+        """As usual for the request itself, then away, then as usual again."""
+
+        def called(*told, **named):
+            calls.append(None)
+            if len(calls) > 1 and away:
+                raise away.pop()
+            return usual(*told, **named)
+
+        return called
+
+    monkeypatch.setattr(OwnerStore, "opens", meanwhile(opens, []))
+    assert [told["state"] for _, told in events(owner, job)] == ["cancelled"]
+    assert not away
+    away = [Unavailable("It is away.")]
+    monkeypatch.setattr(OwnerStore, "opens", opens)
+    monkeypatch.setattr(JobStore, "get", meanwhile(get, []))
+    assert [told["state"] for _, told in events(owner, job)] == ["cancelled"]
+    assert not away
 
 
 def test_a_waiting_job_is_cancelled_at_once(owner, clusters):
