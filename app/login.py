@@ -10,7 +10,7 @@ import hmac
 from fastapi import Response
 from starlette.requests import HTTPConnection
 
-from . import cookies
+from . import cookies, logs
 from .errors import Forbidden
 from .origins import bearer
 from .proxy_login import proxy_user
@@ -18,12 +18,16 @@ from .services import services_of
 
 
 def user_of(connection: HTTPConnection) -> str | None:
-    """Who calls, where that is known: `key:` or `user:` and a name."""
+    """Who calls, where that is known: `key:` or `user:` and a name; told in the log."""
     services = services_of(connection)
     if (key := services.store.keys.name_of(bearer(connection.headers))) is not None:
-        return f"key:{key}"
-    named = proxy_user(connection.scope, services.settings)
-    return None if named is None else f"user:{named}"
+        user = f"key:{key}"
+    elif (named := proxy_user(connection.scope, services.settings)) is not None:
+        user = f"user:{named}"
+    else:
+        return None
+    logs.tell(user=user)
+    return user
 
 
 def is_let_in(connection: HTTPConnection) -> bool:
