@@ -19,6 +19,8 @@ from .access import require_visitor, session_of
 
 DEEPEST = 40
 LONGEST_INTEGER = 30
+MOST_KEYS = 1000
+"""Of one object; no form has so many, and each unknown one would be complained of for itself."""
 AT_ONCE = 65_536
 """Bytes that are read on the event loop; 4 MB would keep everybody waiting for most of a second."""
 
@@ -114,6 +116,10 @@ def _short_integer(text: str) -> int:
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    if len(pairs) > MOST_KEYS:
+        raise ValueError(
+            f"The body holds an object of {len(pairs)} keys; send one of at most {MOST_KEYS}."
+        )
     found = dict(pairs)
     if len(found) < len(pairs):
         raise ValueError("The body holds an object with the same key twice; keep one of them.")
