@@ -11,6 +11,7 @@ from fastapi import Response
 from starlette.requests import HTTPConnection
 
 from . import cookies, logs
+from .callers import caller_of
 from .errors import Forbidden
 from .origins import bearer
 from .proxy_login import proxy_user
@@ -59,10 +60,13 @@ def require_let_in(connection: HTTPConnection) -> None:
 
 def let_in(connection: HTTPConnection, response: Response, token: str) -> bool:
     """Let the browser in if its address holds the service's token or a link's, which is used up."""
-    browsers = services_of(connection).store.browsers
-    if not (_is_service_token(connection, token) or browsers.use_link(token)):
+    services = services_of(connection)
+    browsers, known = services.store.browsers, _is_service_token(connection, token)
+    if not (known or browsers.use_link(token)):
         return False
     if not is_let_in(connection):
+        if known:  # which, unlike a link, can be brought as often as one likes
+            services.callers.let_in(caller_of(connection))
         cookies.give_access(connection, response, browsers.let_in())
     return True
 

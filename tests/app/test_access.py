@@ -5,7 +5,9 @@ import re
 import pytest
 from fastapi.testclient import TestClient
 from ridetune.app.addresses import networks
-from ridetune.app.settings import Settings
+from ridetune.app.settings import Limits, Settings
+from ridetune.app.tables import browsers
+from sqlalchemy import func, select
 
 from .conftest import ADDRESS, open_client
 
@@ -206,6 +208,18 @@ def test_a_key_in_the_address_lets_nobody_in(client):
     """It would stay in histories and logs."""
     key = stores(client).keys.add("rig")
     assert go(client, f"/?token={key}").status_code == 403
+
+
+def test_the_services_token_lets_in_so_many_browsers_a_minute(tmp_path):
+    """Each is kept for 90 days, however often the token is brought."""
+    settings = Settings(data=tmp_path, token="the-services-own", limits=Limits(new_sessions=2))
+    with open_client(settings, login=True) as client:
+        for _ in range(4):
+            last = go(another(client), "/?token=the-services-own")
+        assert last.status_code == 429
+        assert int(last.headers["retry-after"]) > 0
+        with stores(client).database.reading() as connection:
+            assert connection.execute(select(func.count()).select_from(browsers)).scalar() == 2
 
 
 # A proxy that tells the user
