@@ -61,6 +61,7 @@ ALSO: dict[str, tuple[int, ...]] = {
     "campaigns_archive": (409,),
     "campaigns_take_over": READING,
     **{f"{jobs}_submit": READING for jobs in JOB_KINDS},
+    **{f"{jobs}_events": (429,) for jobs in JOB_KINDS},
 }
 """Problems of a route beyond those of its form."""
 

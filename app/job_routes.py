@@ -93,7 +93,13 @@ def job_router(name: str, view: View) -> APIRouter:
         """One of them, with its `result` once it is done."""
         return job_to_json(known, view, with_result=True)
 
-    @router.get("/{jid}/events", response_class=EventSourceResponse)
+    async def watching(sid: SessionId, services: Shared) -> AsyncIterator[None]:
+        with services.jobs.watching(sid, services.settings.limits.session_events):
+            yield
+
+    @router.get(
+        "/{jid}/events", response_class=EventSourceResponse, dependencies=[Depends(watching)]
+    )
     async def events(
         request: Request,
         sid: SessionId,

@@ -6,14 +6,15 @@ process that runs it, and in the database once a second.
 """
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Mapping
-from contextlib import suppress
+from collections import Counter
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import Any
 
 from .cluster import Cluster
 from .dispatcher import Dispatcher
-from .errors import Unavailable
+from .errors import Busy, Unavailable
 from .job_kinds import Kind
 from .job_store import Job
 from .store import Store
@@ -38,6 +39,7 @@ class Jobs:
         self._store = store
         self._kinds = kinds
         self._followers: dict[str, set[asyncio.Event]] = {}
+        self._watching: Counter[str] = Counter()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._dispatcher = Dispatcher(store, cluster, kinds, self._wake, ready, taking)
 
@@ -90,6 +92,25 @@ class Jobs:
         """Stop every job of a session that is about to go."""
         for job in self._store.jobs.unfinished(session):
             self._stop(job)
+
+    @contextmanager
+    def watching(self, session: str, most: int) -> Iterator[None]:
+        """Count who follows a job of a session; for the event loop. Each looks at the database
+        every second.
+        """
+        if self._watching[session] >= most:
+            raise Busy(
+                f"The session's jobs are followed {most} times already; close one of its pages, or "
+                "ask for the job itself now and then.",
+                retry_after=5,
+            )
+        self._watching[session] += 1
+        try:
+            yield
+        finally:
+            self._watching[session] -= 1
+            if not self._watching[session]:
+                del self._watching[session]
 
     async def follow(
         self, session: str, job: str, require: Callable[[], object] = lambda: None

@@ -47,6 +47,7 @@ class Limits:
     session_bytes: int = 500_000_000
     session_jobs: int = 200
     unfinished_jobs: int = 4
+    session_events: int = 40
     session_simulations: int = 4
     waiting_simulations: int = 64
     session_simulated_seconds: float = 200_000.0

@@ -3,12 +3,14 @@
 import json
 import time
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 
 import pytest
 from fastapi.testclient import TestClient
 from ridetune.app.errors import Unavailable
 from ridetune.app.job_store import JobStore
 from ridetune.app.owner_store import OwnerStore
+from ridetune.app.settings import Limits
 
 from .conftest import Visitor, open_client
 
@@ -222,6 +224,29 @@ def test_followers_hear_every_change_and_leave_nothing_behind(service, owner, cl
     assert "running" in seen
     assert seen[-1] == "done"
     assert jobs._followers == {}
+
+
+def test_a_sessions_jobs_are_followed_so_often_at_once(service, owner, clusters, monkeypatch):
+    """Each follower asks the database every second, at the cost of all; it counts to its end."""
+    job = submit(owner)["id"]
+    owner.post(f"/identifications/{job}/cancel")
+    jobs, most = service.app.state.services.jobs, Limits().session_events
+    usual, during = jobs.follow, []
+
+    def follow(*told):
+        during.append(dict(jobs._watching))
+        return usual(*told)
+
+    monkeypatch.setattr(jobs, "follow", follow)
+    with ExitStack() as others:
+        for _ in range(most):
+            others.enter_context(jobs.watching(owner.id, most))
+        refused = owner.get(f"/identifications/{job}/events")
+        assert refused.status_code == 429
+        assert int(refused.headers["retry-after"]) > 0
+    assert len(events(owner, job)) == 1
+    assert during == [{owner.id: 1}]
+    assert not jobs._watching
 
 
 def test_followers_wait_for_a_database_that_is_away(service, owner, clusters, monkeypatch):
