@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar
-from urllib.parse import urlsplit
+from urllib.parse import quote, urlsplit
 
 from . import logs
 from .addresses import Network, in_brackets, is_loopback, networks, origin, without_port
@@ -134,7 +134,7 @@ class Settings:
             host=host or environment.get("RIDETUNE_HOST") or cls.host,
             port=_port(environment.get("RIDETUNE_PORT", cls.port) if port is None else port),
             login=_login(environment.get("RIDETUNE_LOGIN", "on")) if login is None else login,
-            token=environment.get("RIDETUNE_TOKEN", ""),
+            token=_token(environment.get("RIDETUNE_TOKEN", "")),
             public_url=origin(environment.get("RIDETUNE_PUBLIC_URL", "")),
             proxy_user_header=environment.get("RIDETUNE_PROXY_USER_HEADER", "").strip(),
             proxy_addresses=networks(environment.get("RIDETUNE_PROXY_ADDRESSES", "")),
@@ -201,6 +201,16 @@ def _host_names(text: str) -> tuple[str, ...]:
                 "without scheme, port or *."
             )
     return stated
+
+
+def _token(text: str) -> str:
+    """A secret that comes unchanged out of an address, where + is a space."""
+    if text and quote(text, safe="") != text:
+        raise StartError(
+            "RIDETUNE_TOKEN has characters that an address changes; make one of letters and "
+            "digits, as `openssl rand -hex 24` does."
+        )
+    return text
 
 
 def _login(text: str) -> bool:
