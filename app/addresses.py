@@ -21,6 +21,11 @@ def is_loopback(host: str) -> bool:
         return False
 
 
+def in_brackets(host: str) -> str:
+    """A host as addresses and the Host header write it: of IPv6 in brackets."""
+    return f"[{host}]" if host.count(":") > 1 and not host.startswith("[") else host
+
+
 def without_port(host: str) -> str:
     """The name in a Host header."""
     name, colon, port = host.rpartition(":")
@@ -35,9 +40,8 @@ def origin(url: str) -> str:
         parts = urlsplit(url.strip().lower())
         usual, more = USUAL_PORTS.get(parts.scheme), parts.path.strip("/") + parts.query
         if usual and parts.hostname and not more:
-            host = f"[{parts.hostname}]" if ":" in parts.hostname else parts.hostname
             port = "" if parts.port in (None, usual) else f":{parts.port}"
-            return f"{parts.scheme}://{host}{port}"
+            return f"{parts.scheme}://{in_brackets(parts.hostname)}{port}"
     raise StartError(
         f"RIDETUNE_PUBLIC_URL is {url!r}; give scheme and host of the whole service, such as "
         "https://ride.example.com."

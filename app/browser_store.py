@@ -5,10 +5,12 @@ then. Of both only the hash is kept, so what lies in the database lets nobody in
 """
 
 import time
+from contextlib import suppress
 
 from sqlalchemy import delete, insert, select, update
 
 from .database import Database
+from .errors import Unavailable
 from .secret import hashed, new_secret
 from .tables import browsers, links
 
@@ -64,7 +66,8 @@ class BrowserStore:
         if expires is None or expires < now:
             return False
         if expires < now + BROWSER_SECONDS - RENEW_EVERY:
-            with self._database.writing() as connection:
+            # Where nothing can be written, what is kept may still be looked at.
+            with suppress(Unavailable), self._database.writing() as connection:
                 connection.execute(
                     update(browsers).where(ours).values(expires=now + BROWSER_SECONDS)
                 )

@@ -21,6 +21,7 @@ class Callers:
     def __init__(self, limits: Limits, clock: Callable[[], float] = time.monotonic):
         opened, simulated = limits.new_sessions, limits.session_simulated_seconds
         self._sessions = Buckets(opened / 60, opened, clock=clock)
+        self._browsers = Buckets(opened / 60, opened, clock=clock)
         self._simulated = Buckets(simulated / 3600, simulated, clock=clock)
 
     def open_session(self, caller: str) -> None:
@@ -29,6 +30,15 @@ class Callers:
             raise Busy(
                 "Many sessions were opened from where you are within a minute; go on with one of "
                 f"them, or try again in {_in_words(wait)}.",
+                retry_after=math.ceil(wait),
+            )
+
+    def let_in(self, caller: str) -> None:
+        """Refuse one who has many browsers let in a minute, each of which is kept for long."""
+        if wait := self._browsers.take(caller):
+            raise Busy(
+                "Many browsers were let in from where you are within a minute; try again in "
+                f"{_in_words(wait)}.",
                 retry_after=math.ceil(wait),
             )
 

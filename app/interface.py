@@ -16,7 +16,7 @@ from .problems import MEDIA_TYPE
 
 PROBLEMS = {
     400: "The body cannot be read.",
-    403: "The request comes from another host or page, or lacks the service's token.",
+    403: "The request comes from another host or page, or from who was not let in.",
     404: "There is nothing by that name, or it is not the caller's.",
     406: "The reply cannot be had in the form asked for.",
     409: "What is asked for contradicts what is under way, or comes before its result is there.",
@@ -61,12 +61,14 @@ ALSO: dict[str, tuple[int, ...]] = {
     "campaigns_archive": (409,),
     "campaigns_take_over": READING,
     **{f"{jobs}_submit": READING for jobs in JOB_KINDS},
+    **{f"{jobs}_events": (429,) for jobs in JOB_KINDS},
 }
 """Problems of a route beyond those of its form."""
 
 DESCRIPTION = (
-    "Everything is SI, angles in radians. Open a session with `POST /api/sessions` and send its "
-    "token as a bearer with every request below it. Errors are problem details (RFC 9457)."
+    "Everything is SI, angles in radians. Open a session with `POST /api/sessions`; with every "
+    "request below it send what opens it as a bearer: the API key that made it, else its token. "
+    "Errors are problem details (RFC 9457)."
 )
 
 
@@ -106,12 +108,13 @@ def _completed(document: dict[str, Any]) -> dict[str, Any]:
         "session": {
             "type": "http",
             "scheme": "bearer",
-            "description": "What `POST /api/sessions` gave; a browser has it as a cookie.",
+            "description": "The API key that made the session, else the token that `POST "
+            "/api/sessions` gave; a browser has that as a cookie.",
         },
         "service": {
             "type": "http",
             "scheme": "bearer",
-            "description": "RIDETUNE_TOKEN, where the service has one.",
+            "description": "A key of `ridetune keys add`, or RIDETUNE_TOKEN where there is one.",
         },
     }
     for path, method, operation in _operations(document):
@@ -145,7 +148,7 @@ def _complete(path: str, method: str, operation: dict[str, Any]) -> None:
         body["examples"] = {key: {"value": example} for key, example in EXAMPLES[name].items()}
     if path.startswith(SESSION):
         operation["security"] = [{"session": []}]
-    elif name == "sessions_create":
+    elif path.startswith("/api/"):
         operation["security"] = [{}, {"service": []}]
 
 

@@ -3,11 +3,11 @@
 from collections.abc import AsyncIterator, Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Request
 from fastapi.sse import EventSourceResponse, ServerSentEvent
-from starlette.concurrency import run_in_threadpool
 
 from .access import SessionId, session_of
 from .errors import NotFound
@@ -93,7 +93,13 @@ def job_router(name: str, view: View) -> APIRouter:
         """One of them, with its `result` once it is done."""
         return job_to_json(known, view, with_result=True)
 
-    @router.get("/{jid}/events", response_class=EventSourceResponse)
+    async def watching(sid: SessionId, services: Shared) -> AsyncIterator[None]:
+        with services.jobs.watching(sid, services.settings.limits.session_events):
+            yield
+
+    @router.get(
+        "/{jid}/events", response_class=EventSourceResponse, dependencies=[Depends(watching)]
+    )
     async def events(
         request: Request,
         sid: SessionId,
@@ -103,8 +109,8 @@ def job_router(name: str, view: View) -> APIRouter:
         """The job's state now, then every change of state and progress, until its final state."""
         state, progress = None, known.progress
         try:
-            async for job in services.jobs.follow(sid, known.id):
-                await run_in_threadpool(session_of, request, sid)
+            theirs = partial(session_of, request, sid)
+            async for job in services.jobs.follow(sid, known.id, theirs):
                 if job.progress != progress and job.progress:
                     progress = job.progress
                     yield ServerSentEvent(event="progress", data=clean(progress))

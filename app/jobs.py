@@ -6,13 +6,15 @@ process that runs it, and in the database once a second.
 """
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Mapping
-from contextlib import suppress
+from collections import Counter
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import Any
 
 from .cluster import Cluster
 from .dispatcher import Dispatcher
+from .errors import Busy, Unavailable
 from .job_kinds import Kind
 from .job_store import Job
 from .store import Store
@@ -37,6 +39,7 @@ class Jobs:
         self._store = store
         self._kinds = kinds
         self._followers: dict[str, set[asyncio.Event]] = {}
+        self._watching: Counter[str] = Counter()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._dispatcher = Dispatcher(store, cluster, kinds, self._wake, ready, taking)
 
@@ -90,17 +93,47 @@ class Jobs:
         for job in self._store.jobs.unfinished(session):
             self._stop(job)
 
-    async def follow(self, session: str, job: str) -> AsyncIterator[Job]:
-        """The job as it stands, then again after each change, until its final state."""
+    @contextmanager
+    def watching(self, session: str, most: int) -> Iterator[None]:
+        """Count who follows a job of a session; for the event loop. Each looks at the database
+        every second.
+        """
+        if self._watching[session] >= most:
+            raise Busy(
+                f"The session's jobs are followed {most} times already; close one of its pages, or "
+                "ask for the job itself now and then.",
+                retry_after=5,
+            )
+        self._watching[session] += 1
+        try:
+            yield
+        finally:
+            self._watching[session] -= 1
+            if not self._watching[session]:
+                del self._watching[session]
+
+    async def follow(
+        self, session: str, job: str, require: Callable[[], object] = lambda: None
+    ) -> AsyncIterator[Job]:
+        """The job as it stands, then again after each change, until its final state; nothing while
+        the database is away. Before each look `require` may refuse.
+        """
+
+        def look() -> Job | None:
+            with suppress(Unavailable):
+                require()
+                return self.get(session, job)
+
         changed = asyncio.Event()
         self._followers.setdefault(job, set()).add(changed)
         try:
             while True:
                 changed.clear()
-                now = await asyncio.to_thread(self.get, session, job)
-                yield now
-                if now.ended:
-                    return
+                now = await asyncio.to_thread(look)
+                if now is not None:
+                    yield now
+                    if now.ended:
+                        return
                 with suppress(TimeoutError):
                     await asyncio.wait_for(changed.wait(), POLL_EVERY)
         finally:

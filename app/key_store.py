@@ -1,13 +1,14 @@
 """API keys of programs: shown once, kept as hashes, ended by removing them."""
 
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 
 from sqlalchemy import delete, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
 from .database import Database
-from .errors import Conflict, InvalidRequest, NotFound
+from .errors import Conflict, InvalidRequest, NotFound, Unavailable
 from .secret import hashed, new_secret
 from .tables import keys
 
@@ -79,6 +80,7 @@ class KeyStore:
         if row is None:
             return None
         if row.used is None or row.used < now - USED_EVERY:
-            with self._database.writing() as connection:
+            # Where nothing can be written, what is kept may still be looked at.
+            with suppress(Unavailable), self._database.writing() as connection:
                 connection.execute(update(keys).where(ours).values(used=now))
         return row.name

@@ -10,7 +10,8 @@ import hmac
 from fastapi import Response
 from starlette.requests import HTTPConnection
 
-from . import cookies
+from . import cookies, logs
+from .callers import caller_of
 from .errors import Forbidden
 from .origins import bearer
 from .proxy_login import proxy_user
@@ -18,12 +19,16 @@ from .services import services_of
 
 
 def user_of(connection: HTTPConnection) -> str | None:
-    """Who calls, where that is known: `key:` or `user:` and a name."""
+    """Who calls, where that is known: `key:` or `user:` and a name; told in the log."""
     services = services_of(connection)
     if (key := services.store.keys.name_of(bearer(connection.headers))) is not None:
-        return f"key:{key}"
-    named = proxy_user(connection.scope, services.settings)
-    return None if named is None else f"user:{named}"
+        user = f"key:{key}"
+    elif (named := proxy_user(connection.scope, services.settings)) is not None:
+        user = f"user:{named}"
+    else:
+        return None
+    logs.tell(user=user)
+    return user
 
 
 def is_let_in(connection: HTTPConnection) -> bool:
@@ -55,10 +60,13 @@ def require_let_in(connection: HTTPConnection) -> None:
 
 def let_in(connection: HTTPConnection, response: Response, token: str) -> bool:
     """Let the browser in if its address holds the service's token or a link's, which is used up."""
-    browsers = services_of(connection).store.browsers
-    if not (_is_service_token(connection, token) or browsers.use_link(token)):
+    services = services_of(connection)
+    browsers, known = services.store.browsers, _is_service_token(connection, token)
+    if not (known or browsers.use_link(token)):
         return False
     if not is_let_in(connection):
+        if known:  # which, unlike a link, can be brought as often as one likes
+            services.callers.let_in(caller_of(connection))
         cookies.give_access(connection, response, browsers.let_in())
     return True
 

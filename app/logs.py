@@ -69,7 +69,7 @@ class TextLines(logging.Formatter):
         """The line of a record."""
         message = record.getMessage().translate(_VISIBLE)
         told = " ".join(f"{name}={value}" for name, value in known_about().items())
-        suffix = f" [{told}]" if told else ""
+        suffix = f" [{told.translate(_VISIBLE)}]" if told else ""
         line = f"{_instant(record)} {record.levelname} {record.name}: {message}{suffix}"
         if not record.exc_info:
             return line

@@ -8,7 +8,7 @@ from pathlib import Path
 import uvicorn
 
 from . import logs
-from .addresses import is_loopback
+from .addresses import in_brackets, is_loopback
 from .connection import connections
 from .errors import StartError
 from .invitation import link, link_command, note_address
@@ -56,8 +56,8 @@ def serve(settings: Settings) -> None:
 def _address(settings: Settings, listener: socket.socket) -> str:
     """Where visitors find the service."""
     host, port = listener.getsockname()[:2]
-    shown = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(host, f"[{host}]" if ":" in host else host)
-    return settings.public_url or f"http://{shown}:{port}"
+    shown = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host) or host
+    return settings.public_url or f"http://{in_brackets(shown)}:{port}"
 
 
 def _invite(settings: Settings, store: Store, address: str) -> None:

@@ -17,10 +17,10 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar
-from urllib.parse import urlsplit
+from urllib.parse import quote, urlsplit
 
 from . import logs
-from .addresses import Network, is_loopback, networks, origin, without_port
+from .addresses import Network, in_brackets, is_loopback, networks, origin, without_port
 from .errors import StartError
 
 LIMIT = "RIDETUNE_LIMIT_"
@@ -47,6 +47,7 @@ class Limits:
     session_bytes: int = 500_000_000
     session_jobs: int = 200
     unfinished_jobs: int = 4
+    session_events: int = 40
     session_simulations: int = 4
     waiting_simulations: int = 64
     session_simulated_seconds: float = 200_000.0
@@ -133,11 +134,11 @@ class Settings:
             host=host or environment.get("RIDETUNE_HOST") or cls.host,
             port=_port(environment.get("RIDETUNE_PORT", cls.port) if port is None else port),
             login=_login(environment.get("RIDETUNE_LOGIN", "on")) if login is None else login,
-            token=environment.get("RIDETUNE_TOKEN", ""),
+            token=_token(environment.get("RIDETUNE_TOKEN", "")),
             public_url=origin(environment.get("RIDETUNE_PUBLIC_URL", "")),
             proxy_user_header=environment.get("RIDETUNE_PROXY_USER_HEADER", "").strip(),
             proxy_addresses=networks(environment.get("RIDETUNE_PROXY_ADDRESSES", "")),
-            allowed_hosts=tuple(name.strip() for name in allowed.split(",") if name.strip()),
+            allowed_hosts=_host_names(allowed),
             cluster=cluster,
             certificates=_certificates(cluster, environment),
             database=environment.get("RIDETUNE_DATABASE", ""),
@@ -184,10 +185,32 @@ class Settings:
 
     def host_names(self) -> frozenset[str]:
         """Names a request's Host header may carry, lower case and without port."""
-        own = () if self.host in ("0.0.0.0", "::") else (self.host,)
+        own = () if self.host in ("0.0.0.0", "::") else (in_brackets(self.host),)
         public = (without_port(urlsplit(self.public_url).netloc),) if self.public_url else ()
         names = ("localhost", "127.0.0.1", "[::1]", *own, *public, *self.allowed_hosts)
         return frozenset(name.lower() for name in names)
+
+
+def _host_names(text: str) -> tuple[str, ...]:
+    """What RIDETUNE_ALLOWED_HOSTS lists, as a Host header has it."""
+    stated = tuple(in_brackets(name.strip()) for name in text.split(",") if name.strip())
+    for name in stated:
+        if "/" in name or "*" in name or without_port(name) != name:
+            raise StartError(
+                f"RIDETUNE_ALLOWED_HOSTS has {name!r}; list names only, such as ride.example.com, "
+                "without scheme, port or *."
+            )
+    return stated
+
+
+def _token(text: str) -> str:
+    """A secret that comes unchanged out of an address, where + is a space."""
+    if text and quote(text, safe="") != text:
+        raise StartError(
+            "RIDETUNE_TOKEN has characters that an address changes; make one of letters and "
+            "digits, as `openssl rand -hex 24` does."
+        )
+    return text
 
 
 def _login(text: str) -> bool:

@@ -1,5 +1,5 @@
 """Request bodies as I-JSON (RFC 7493) means them: no NaN, no infinity, no key twice, nothing too
-deep to walk.
+deep to walk; read only of who may send them.
 
 Python's reader is more generous than the standard, and what it lets in (NaN, 1e999) cannot be
 written back, so a reply that mentions it would fail.
@@ -13,9 +13,16 @@ from typing import Any, NoReturn
 
 from fastapi import HTTPException, Request, Response
 from fastapi.routing import APIRoute
+from starlette.concurrency import run_in_threadpool
+
+from .access import require_visitor, session_of
 
 DEEPEST = 40
 LONGEST_INTEGER = 30
+MOST_KEYS = 1000
+"""Of one object; no form has so many, and each unknown one would be complained of for itself."""
+AT_ONCE = 65_536
+"""Bytes that are read on the event loop; 4 MB would keep everybody waiting for most of a second."""
 
 
 class StrictRoute(APIRoute):
@@ -27,11 +34,23 @@ class StrictRoute(APIRoute):
 
         async def strict(request: Request) -> Response:
             request = StrictRequest(request.scope, request.receive)
-            if self.body_field is not None and not await request.body():
-                raise HTTPException(400, "The body is empty; send JSON.")
+            if self.body_field is not None:
+                # FastAPI reads a body before it asks who sends it, and a large one takes long.
+                await run_in_threadpool(_require_owner, request)
+                if not await request.body():
+                    raise HTTPException(400, "The body is empty; send JSON.")
             return await handler(request)
 
         return strict
+
+
+def _require_owner(request: Request) -> None:
+    """Refuse whose body need not be read."""
+    sid = request.path_params.get("sid")
+    if sid is None:
+        require_visitor(request)
+    else:
+        session_of(request, sid)
 
 
 class StrictRequest(Request):
@@ -40,7 +59,10 @@ class StrictRequest(Request):
     async def json(self) -> Any:
         """Parsed body; HTTP 400 with a sentence for one that cannot be read."""
         try:
-            return loads(await self.body())
+            body = await self.body()
+            if len(body) <= AT_ONCE:
+                return loads(body)
+            return await run_in_threadpool(loads, body)
         except json.JSONDecodeError as error:
             raise HTTPException(400, _not_json(error)) from None
         except RecursionError:
@@ -94,6 +116,10 @@ def _short_integer(text: str) -> int:
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    if len(pairs) > MOST_KEYS:
+        raise ValueError(
+            f"The body holds an object of {len(pairs)} keys; send one of at most {MOST_KEYS}."
+        )
     found = dict(pairs)
     if len(found) < len(pairs):
         raise ValueError("The body holds an object with the same key twice; keep one of them.")

@@ -196,11 +196,10 @@ async def relay(websocket: WebSocket, sid: str) -> None:
     viewers: Viewers = websocket.app.state.services.viewers
     try:
         await run_in_threadpool(session_of, websocket, sid)
+        viewer = await run_in_threadpool(viewers.watch, sid, 1)
     except NotFound:
         await _hang_up(websocket, 1008)
         return
-    try:
-        viewer = await run_in_threadpool(viewers.watch, sid, 1)
     except (Busy, Unavailable) as refused:
         await _hang_up(websocket, 1013, str(refused))
         return
@@ -258,7 +257,9 @@ async def _until_lost(websocket: WebSocket, sid: str) -> None:
     with suppress(NotFound):
         while True:
             await asyncio.sleep(LOOK_AGAIN_SECONDS)
-            await run_in_threadpool(session_of, websocket, sid)
+            # While nobody can tell, it stays theirs.
+            with suppress(Unavailable):
+                await run_in_threadpool(session_of, websocket, sid)
     await _hang_up(websocket, 1008)
 
 

@@ -195,7 +195,7 @@ export function follow(kind, id, onProgress, onState) {
         onState(found);
         if (!isFinal(found.state)) stop = follow(kind, id, onProgress, onState);
       } catch (error) {
-        if (error.lost) source.dispatchEvent(new Event("error"));
+        if (error.lost || error.status >= 500) source.dispatchEvent(new Event("error"));
       }
     }, 2000);
   });

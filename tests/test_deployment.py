@@ -10,6 +10,7 @@ import pytest
 import yaml
 from distributed.cli import dask_scheduler, dask_worker
 from ridetune.app.cluster import CONFIGURATION
+from ridetune.app.origins import refusal
 from ridetune.app.settings import Settings
 
 ROOT = Path(__file__).parents[1]
@@ -43,6 +44,20 @@ def test_every_variable_is_a_setting(file):
     environment = Asked()
     Settings.from_environment(environment=environment)
     assert set(re.findall(r"RIDETUNE_[A-Z_]+", file.read_text())) <= environment.names
+
+
+@pytest.mark.parametrize("file", ["Caddyfile", "nginx.conf", "compose.yaml"])
+def test_the_page_may_change_something_through_the_proxy(file):
+    """Its origin is https and the service's own scheme is http, so the service has to be told."""
+    told = dict(re.findall(r"(RIDETUNE_[A-Z_]+)=(\S+)", (DEPLOY / file).read_text()))
+    if file == "compose.yaml":
+        told = {"RIDETUNE_PUBLIC_URL": "https://ride.example"}
+        assert told.keys() <= COMPOSE["services"]["ridetune"]["environment"].keys()
+    settings = Settings.from_environment(environment=told)
+    sent = {"host": "ride.example", "origin": "https://ride.example"}
+    headers = [(name.encode(), value.encode()) for name, value in sent.items()]
+    scope = {"type": "http", "method": "POST", "headers": headers}
+    assert refusal(scope, settings.host_names(), settings.public_url) is None
 
 
 def test_what_the_image_is_made_of_is_there_and_sent():

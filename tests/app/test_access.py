@@ -5,7 +5,9 @@ import re
 import pytest
 from fastapi.testclient import TestClient
 from ridetune.app.addresses import networks
-from ridetune.app.settings import Settings
+from ridetune.app.settings import Limits, Settings
+from ridetune.app.tables import browsers
+from sqlalchemy import func, select
 
 from .conftest import ADDRESS, open_client
 
@@ -53,6 +55,19 @@ def test_who_was_not_let_in_gets_nothing_but_a_page_that_says_what_to_do(client,
     assert client.get("/api/sessions").json() == []
     assert stores(client).owners.sessions(user=None, tokens=[]) == []
     assert not client.cookies
+
+
+@pytest.mark.parametrize(
+    ("path", "status"),
+    [("/api/roads/preview", 403), ("/api/sessions/0123456789abcdef/simulations", 404)],
+)
+def test_nothing_is_read_of_who_was_not_let_in(client, monkeypatch, path, status):
+    """4 MB of JSON are most of a second's work, which nobody should do for a stranger."""
+    read = []
+    monkeypatch.setattr("ridetune.app.strict_json.loads", read.append)
+    assert client.post(path, json={}).status_code == status
+    assert client.post(path, content=b"").status_code == status
+    assert read == []
 
 
 def test_whether_the_service_runs_is_told_to_everybody(client):
@@ -193,6 +208,18 @@ def test_a_key_in_the_address_lets_nobody_in(client):
     """It would stay in histories and logs."""
     key = stores(client).keys.add("rig")
     assert go(client, f"/?token={key}").status_code == 403
+
+
+def test_the_services_token_lets_in_so_many_browsers_a_minute(tmp_path):
+    """Each is kept for 90 days, however often the token is brought."""
+    settings = Settings(data=tmp_path, token="the-services-own", limits=Limits(new_sessions=2))
+    with open_client(settings, login=True) as client:
+        for _ in range(4):
+            last = go(another(client), "/?token=the-services-own")
+        assert last.status_code == 429
+        assert int(last.headers["retry-after"]) > 0
+        with stores(client).database.reading() as connection:
+            assert connection.execute(select(func.count()).select_from(browsers)).scalar() == 2
 
 
 # A proxy that tells the user

@@ -48,6 +48,14 @@ def test_what_belongs_to_a_session_asks_for_its_token(operations):
         assert ("/{sid}" in path) == (operation.get("security") == [{"session": []}])
 
 
+def test_only_the_health_is_open_to_everybody(operations):
+    """All else may ask for a key or the service's token; without login it does not."""
+    for _, path, operation in operations.values():
+        if "/{sid}" not in path:
+            told = operation.get("security", [{}])
+            assert ({"service": []} in told) == path.startswith("/api/")
+
+
 EVERY = [(name, key) for name, examples in EXAMPLES.items() for key in examples]
 IMMEDIATE = [
     (name, key)

@@ -3,10 +3,14 @@
 import json
 import time
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 
 import pytest
 from fastapi.testclient import TestClient
 from ridetune.app.errors import Unavailable
+from ridetune.app.job_store import JobStore
+from ridetune.app.owner_store import OwnerStore
+from ridetune.app.settings import Limits
 
 from .conftest import Visitor, open_client
 
@@ -220,6 +224,58 @@ def test_followers_hear_every_change_and_leave_nothing_behind(service, owner, cl
     assert "running" in seen
     assert seen[-1] == "done"
     assert jobs._followers == {}
+
+
+def test_a_sessions_jobs_are_followed_so_often_at_once(service, owner, clusters, monkeypatch):
+    """Each follower asks the database every second, at the cost of all; it counts to its end."""
+    job = submit(owner)["id"]
+    owner.post(f"/identifications/{job}/cancel")
+    jobs, most = service.app.state.services.jobs, Limits().session_events
+    usual, during = jobs.follow, []
+
+    def follow(*told):
+        during.append(dict(jobs._watching))
+        return usual(*told)
+
+    monkeypatch.setattr(jobs, "follow", follow)
+    with ExitStack() as others:
+        for _ in range(most):
+            others.enter_context(jobs.watching(owner.id, most))
+        refused = owner.get(f"/identifications/{job}/events")
+        assert refused.status_code == 429
+        assert int(refused.headers["retry-after"]) > 0
+    assert len(events(owner, job)) == 1
+    assert during == [{owner.id: 1}]
+    assert not jobs._watching
+
+
+def test_followers_wait_for_a_database_that_is_away(service, owner, clusters, monkeypatch):
+    """Whether it cannot tell how the job stands or whose it is."""
+    monkeypatch.setattr("ridetune.app.jobs.POLL_EVERY", 0.01)
+    job = submit(owner)["id"]
+    assert owner.post(f"/identifications/{job}/cancel").status_code == 202
+    away = [Unavailable("It is away.") for _ in range(4)]
+    opens, get = OwnerStore.opens, JobStore.get
+
+    def meanwhile(usual, calls):
+        """As usual for the request itself, then away, then as usual again."""
+
+        def called(*told, **named):
+            calls.append(None)
+            if len(calls) > 1 and away:
+                raise away.pop()
+            return usual(*told, **named)
+
+        return called
+
+    monkeypatch.setattr(OwnerStore, "opens", meanwhile(opens, []))
+    assert [told["state"] for _, told in events(owner, job)] == ["cancelled"]
+    assert not away
+    away = [Unavailable("It is away.")]
+    monkeypatch.setattr(OwnerStore, "opens", opens)
+    monkeypatch.setattr(JobStore, "get", meanwhile(get, []))
+    assert [told["state"] for _, told in events(owner, job)] == ["cancelled"]
+    assert not away
 
 
 def test_a_waiting_job_is_cancelled_at_once(owner, clusters):

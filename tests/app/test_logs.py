@@ -100,6 +100,23 @@ def test_a_json_record_says_what_it_is_about():
     assert "request" not in json.loads(JsonLines().format(record("after")))
 
 
+def test_what_a_record_is_about_is_on_its_line_too():
+    """A proxy may name a user by whatever a header can hold, such as the NEL of latin-1."""
+    with about(user="anna\x85forged\x1b[2J"):
+        line = TextLines().format(record("done"))
+    assert len(line.splitlines()) == 1
+    assert "\x1b" not in line
+
+
+def test_a_request_is_told_with_its_user(client, lines):
+    key = client.app.state.services.store.keys.add("script")
+    lines.clear()
+    client.get("/api/sessions", headers={"Authorization": f"Bearer {key}"})
+    client.get("/api/sessions")
+    assert [line.get("user") for line in lines] == ["key:script", None]
+    assert key not in str(lines)
+
+
 def test_what_a_record_is_about_goes_into_the_pool():
     async def run():
         pool = Pool("simulations", 1, share=1, most=1, at_once=1)

@@ -183,6 +183,24 @@ def test_an_sqlite_database_that_takes_nothing_can_be_looked_at(client, case):
     assert client.post("/api/sessions").status_code == 201
 
 
+def test_who_was_let_in_stays_so_while_the_database_takes_nothing(settings):
+    """By a key or as a browser; it is time to note that either is in use."""
+    pragma = SQLITE["read-only"][0]
+    with open_client(settings, login=True) as service:
+        store: Store = service.app.state.services.store
+        key = {"Authorization": f"Bearer {store.keys.add('script')}"}
+        service.get(f"/?token={store.browsers.make_link()}")
+        with store.database.writing() as connection:
+            connection.execute(text("UPDATE browsers SET expires = expires - 7200"))
+        event.listen(
+            store.database._writer.pool,
+            "checkout",
+            lambda connection, *_: connection.execute(f"PRAGMA {pragma}").close(),
+        )
+        assert service.get("/api/parameters", headers=key).status_code == 200
+        assert service.get("/api/parameters").status_code == 200
+
+
 def test_a_job_s_files_wait_for_room(tmp_path, database, monkeypatch):
     """Oracle: the job is as it was, and can be ended once there is room."""
     store = Store(tmp_path, Limits(), database)

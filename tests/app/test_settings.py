@@ -132,6 +132,28 @@ def test_the_service_answers_to_its_own_and_the_allowed_names():
     assert settings.host_names() == {"localhost", "127.0.0.1", "[::1]", "ride.example"}
 
 
+@pytest.mark.parametrize("token", ["a+b", "a/b=", "a b", "a&b", " ab", "ab\n"])
+def test_a_token_that_an_address_changes_is_refused(token):
+    """By `/?token=` it would let nobody in. The sentence does not repeat it."""
+    with pytest.raises(StartError, match="RIDETUNE_TOKEN has characters") as refused:
+        Settings.from_environment(data="x", environment={"RIDETUNE_TOKEN": token})
+    assert token not in str(refused.value)
+
+
+def test_an_address_of_ipv6_is_a_host_name_in_brackets():
+    """Oracle: the Host header of RFC 9110, whose IP-literal is of RFC 3986."""
+    environment = {"RIDETUNE_HOST": "fd00::1", "RIDETUNE_ALLOWED_HOSTS": "fd00::2, [fd00::3]"}
+    names = Settings.from_environment(data="x", environment=environment).host_names()
+    assert {"[fd00::1]", "[fd00::2]", "[fd00::3]"} <= names
+
+
+@pytest.mark.parametrize("name", ["https://ride.example", "ride.example:8443", "*.ride.example"])
+def test_what_no_host_header_has_is_no_allowed_name(name):
+    """It would be answered to never, without a word why."""
+    with pytest.raises(StartError, match="RIDETUNE_ALLOWED_HOSTS has"):
+        Settings.from_environment(data="x", environment={"RIDETUNE_ALLOWED_HOSTS": name})
+
+
 def test_the_address_of_the_database_is_not_shown():
     """It may hold a password."""
     url = "postgresql://user:open-sesame@host/name"

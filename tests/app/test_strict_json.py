@@ -19,6 +19,7 @@ UNREADABLE = {
     "bad UTF-8": b'{"manoeuvre": "\xff\xfe"}',
     "UTF-16": '{"seq": 1}'.encode("utf-16"),
     "half a character": b'{"vehicle": {"name": "\\ud800"}}',
+    "more keys than any form has": b"{%s}" % b",".join(b'"k%d": 1' % i for i in range(1001)),
     "key twice": b'{"seq": 1, "seq": 2}',
     "cut off": b'{"seq": 1',
     "blank": b" ",

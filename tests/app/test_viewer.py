@@ -109,6 +109,39 @@ def test_an_open_view_ends_with_the_session(client, visitor, monkeypatch):
     assert refused.value.code == 1008
 
 
+def test_an_open_view_outlasts_a_database_that_is_away(client, visitor, monkeypatch):
+    monkeypatch.setattr(viewer, "LOOK_AGAIN_SECONDS", 0.01)
+    usual, looks = viewer.session_of, []
+
+    def away(*told):
+        looks.append(told)
+        if 2 <= len(looks) <= 4:
+            raise Unavailable("It is away.")
+        return usual(*told)
+
+    monkeypatch.setattr(viewer, "session_of", away)
+    with open_socket(client, visitor) as socket:
+        deadline = time.monotonic() + 20
+        while len(looks) < 6:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        client.app.state.services.store.sessions.delete(visitor.id)
+        with pytest.raises(WebSocketDisconnect) as refused:
+            read_on(socket)
+    assert refused.value.code == 1008
+
+
+def test_a_view_of_a_database_that_is_away_is_put_off(client, visitor, monkeypatch, caplog):
+    def away(*_):
+        raise Unavailable("It is away.")
+
+    monkeypatch.setattr(viewer, "session_of", away)
+    with pytest.raises(WebSocketDisconnect) as refused, open_socket(client, visitor):
+        pass
+    assert refused.value.code == 1013
+    assert "unexpected" not in caplog.text
+
+
 def test_a_client_of_another_version_is_told_so(client, visitor):
     with (
         open_socket(client, visitor, "viser-v0.0.1") as socket,

@@ -26,6 +26,25 @@ def fit_of(visitor, channel):
     return visitor.look(f"ridetune.state('now').head.fit_percent['{channel}']")
 
 
+def test_a_fit_is_followed_again_after_the_service_could_not_answer(visitor):
+    """As while it ends or its database is away: its events are refused, and so is the next look."""
+    visitor.expect("status of 503")
+    refused = []
+
+    def away(route):
+        if len(refused) < 2 and route.request.method == "GET":
+            refused.append(route.request.url.rsplit("/", 1)[-1])
+            route.fulfill(status=503, content_type="application/problem+json", body="{}")
+        else:
+            route.continue_()
+
+    visitor.page.route("**/identifications/**", away)
+    visitor.click("#identify")
+    visitor.until("ridetune.state('fit') !== null", 120)
+    assert len(refused) == 2
+    assert refused[0] == "events" != refused[1]
+
+
 def test_a_newcomer_identifies_the_sample_car_and_applies_it(visitor):
     """Open, press Identify, apply: the charts move towards the measurement."""
     before, worse = visitor.line("chassis.pitch"), fit_of(visitor, "chassis.pitch")
