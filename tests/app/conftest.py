@@ -94,12 +94,13 @@ class Visitor:
 def workers() -> Iterator[str]:
     """Address of the job workers that many services share: to start some takes ten seconds."""
     config.set(CONFIGURATION)
+    logging.getLogger("distributed").setLevel(logging.ERROR)
     with LocalCluster(
         n_workers=1,
         threads_per_worker=1,
         dashboard_address=None,
         scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
-        silence_logs=logging.ERROR,
+        silence_logs=False,  # it would silence pytest's handlers, too
     ) as cluster:
         yield cluster.scheduler_address
 

@@ -12,6 +12,7 @@ from ridetune.app.cli import main
 
 from .command_line import PROGRAM, refused
 
+PATIENCE = 60.0
 LINK = r"Open (http://127\.0\.0\.1:\d+)/(\?token=[\w-]{43})\n"
 
 
@@ -48,7 +49,7 @@ def run(capsys, *arguments):
 
 def test_serve_prints_a_link_that_lets_in(service):
     address, token = re.fullmatch(LINK, service[0]).groups()
-    with httpx2.Client(base_url=address) as browser:
+    with httpx2.Client(base_url=address, timeout=PATIENCE) as browser:
         assert browser.get("/").status_code == 403
         assert browser.get(f"/{token}").status_code == 303
         assert browser.post("/api/sessions").status_code == 201
@@ -58,7 +59,7 @@ def test_another_link_leads_to_the_running_service(service, capsys):
     printed = run(capsys, "link", "--data", str(service[1]))
     address, token = re.fullmatch(LINK, printed).groups()
     assert address in service[0]
-    assert httpx2.get(f"{address}/{token}").status_code == 303
+    assert httpx2.get(f"{address}/{token}", timeout=PATIENCE).status_code == 303
 
 
 def test_keys_come_and_go_beside_the_running_service(service, capsys):
@@ -67,12 +68,16 @@ def test_keys_come_and_go_beside_the_running_service(service, capsys):
     key = capsys.readouterr().out.strip()
     address = re.match(LINK, service[0])[1]
     brought = {"Authorization": f"Bearer {key}"}
-    assert httpx2.post(f"{address}/api/sessions", headers=brought).status_code == 201
+    assert (
+        httpx2.post(f"{address}/api/sessions", headers=brought, timeout=PATIENCE).status_code == 201
+    )
     [_, row] = run(capsys, "keys", "list", *data).splitlines()
     assert re.fullmatch(r"rig 3 +rt_[\w-]{6}\.\.\. +[\d: -]{16} +[\d: -]{16}", row)
     assert key not in row
     assert "rig 3" in run(capsys, "keys", "remove", "rig 3", *data)
-    assert httpx2.post(f"{address}/api/sessions", headers=brought).status_code == 403
+    assert (
+        httpx2.post(f"{address}/api/sessions", headers=brought, timeout=PATIENCE).status_code == 403
+    )
 
 
 def test_nobody_forwards_themselves_into_the_proxys_place(tmp_path):
@@ -84,7 +89,10 @@ def test_nobody_forwards_themselves_into_the_proxys_place(tmp_path):
     with serve(tmp_path, **proxy) as process:
         address = re.search(r"http://[\d.:]+", process.stdout.readline())[0]
         forged = {"X-Forwarded-User": "anna", "X-Forwarded-For": "10.0.0.1"}
-        assert httpx2.get(f"{address}/api/sessions", headers=forged).status_code == 403
+        assert (
+            httpx2.get(f"{address}/api/sessions", headers=forged, timeout=PATIENCE).status_code
+            == 403
+        )
         process.send_signal(signal.SIGINT)
         process.communicate(timeout=60)
 

@@ -9,6 +9,8 @@ from ridetune.app.bench.service.figure import Figure, Measured, percentile
 from ridetune.app.bench.service.run import ServiceReport, report_to_json, table
 from ridetune.app.cli import main
 
+from ..loop import in_a_loop
+
 
 @pytest.mark.parametrize("count", [1, 2, 99, 100, 101])
 def test_a_percentile_is_the_least_value_that_so_many_do_not_exceed(count):
@@ -57,7 +59,7 @@ def test_a_connection_serves_many_requests_and_says_what_was_refused():
                 await connection.wanted(sent)
             connection.close()
 
-    asyncio.run(asked())
+    in_a_loop(asked)
     assert [body for _, body in got] == [b'{"car":7}'] * 2
     assert b"Authorization: Bearer secret\r\n" in got[0][0]
 
