@@ -36,9 +36,9 @@ class FileStore:
 
     def keep(self, connection: Connection, files: Sequence[bytes]) -> list[str]:
         """Keep files to which the transaction goes on to refer; the SHA-256 of each."""
-        by_hash = {hashlib.sha256(data).hexdigest(): data for data in files}
-        self._lock(connection, by_hash)
-        for sha256, data in by_hash.items():
+        hashes = [hashlib.sha256(data).hexdigest() for data in files]
+        self._lock(connection, hashes)
+        for sha256, data in dict(zip(hashes, files, strict=True)).items():
             with files_in_a_sentence():
                 self._directory.keep(sha256, data)
             row = select(uploads.c.sha256).where(uploads.c.sha256 == sha256)
@@ -48,7 +48,7 @@ class FileStore:
                         sha256=sha256, bytes=len(data), created=self._database.now
                     )
                 )
-        return [hashlib.sha256(data).hexdigest() for data in files]
+        return hashes
 
     def original(self, sha256: str) -> Path:
         """Place of a file that has its row."""
