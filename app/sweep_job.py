@@ -138,7 +138,10 @@ def _share(cars: int, steps: float) -> int:
 
 
 def _shares(spec: Mapping[str, Any]) -> list[str]:
-    """First and last car of each unit."""
+    """First and last car of each unit; of a job kept from before there were any, one has all."""
+    if "share" not in spec:
+        form = {name: spec[name] for name in SweepRequest.model_fields if name in spec}
+        return [f"0-{design_of(SweepRequest.model_validate(form).design).cars - 1}"]
     starts = range(0, spec["cars"], spec["share"])
     return [f"{first}-{min(first + spec['share'], spec['cars']) - 1}" for first in starts]
 
@@ -147,7 +150,7 @@ def _progress(spec: Mapping[str, Any], shares: Mapping[str, Progress], at_once: 
     """Cars of all units; `seconds` are those of the workers together."""
     known = [share for share in shares.values() if share]
     counted = {name: sum(share[name] for share in known) for name in ("cars", "failed", "seconds")}
-    return {**counted, "of": spec["cars"]}
+    return {**counted, "of": spec.get("cars", max((one["of"] for one in known), default=0))}
 
 
 def _swept(payload: Any) -> tuple[Any, Any, Any]:
@@ -186,9 +189,7 @@ def sweep_share(payload: Any, attempt: Attempt) -> WithFile:
     )
     stream = io.BytesIO()
     write_blocks(stream, "parquet", description(vehicle, design, driven), blocks)
-    return WithFile(
-        {name: reached[name] for name in ("cars", "failed", "seconds")}, stream.getvalue()
-    )
+    return WithFile(reached, stream.getvalue())
 
 
 def join_shares(payload: Any, attempt: Attempt) -> WithFile:
@@ -199,15 +200,16 @@ def join_shares(payload: Any, attempt: Attempt) -> WithFile:
     from ..engine.sweeps.sweep_file import description, read_blocks, write_blocks
 
     shares = [attempt.kept[name] for name in _shares(payload)]
-    failed = 0
+    cars = failed = 0
 
     def rows(share: bytes) -> Any:
-        nonlocal failed
+        nonlocal cars, failed
         for block in read_blocks(io.BytesIO(share))[1]:
+            cars += len(block["status"])
             failed += int((block["status"] != OK).sum())
             yield block
 
     described, stream = description(*_swept(payload)), io.BytesIO()
     write_blocks(stream, "parquet", described, chain.from_iterable(map(rows, shares)))
-    result = {"cars": payload["cars"], "failed": failed, "columns": described["columns"]}
+    result = {"cars": cars, "failed": failed, "columns": described["columns"]}
     return WithFile(result, stream.getvalue())

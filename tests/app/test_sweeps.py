@@ -2,6 +2,7 @@
 
 import io
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ from numpy.testing import assert_array_equal
 from pyarrow import feather, parquet
 from ridetune.app.schemas import SweepRequest
 from ridetune.app.settings import Limits, Settings
-from ridetune.app.sweep_job import most_bytes
+from ridetune.app.sweep_job import join_shares, most_bytes, sweep
+from ridetune.app.worker import Attempt
 from ridetune.engine.manoeuvre import reference_manoeuvres
 from ridetune.engine.simulation.excitation import FreeExcitation
 from ridetune.engine.sweeps.designs import Sobol
@@ -280,6 +282,20 @@ def test_what_goes_to_the_worker_is_everything_it_needs(tmp_path, monkeypatch):
         assert {name: again[name] for name in again if name != "run"} == {
             name: first[name] for name in first if name != "run"
         }
+
+
+def test_a_sweep_kept_from_before_there_were_shares_is_one(done):
+    """Oracle: the same sweep's result. Its spec told neither cars nor share."""
+    told: list = []
+    spec = {name: done[name] for name in SweepRequest.model_fields if name in done} | {"run": None}
+    division = sweep(None, None).division
+    [share] = division.names(spec)
+    assert share == "0-11"
+    attempt = Attempt(told.append, lambda: False, lambda part, data: None, {})
+    part = division.unit({**spec, "unit": share}, attempt)
+    assert division.progress(spec, {share: told[-1]}, 1) == {**part.result, "of": 12}
+    whole = join_shares(spec, replace(attempt, kept={share: part.file}))
+    assert whole.result == done["result"]
 
 
 def test_a_sweep_outlives_a_kill_of_the_service_and_so_do_the_rows_of_another(tmp_path, workers):
