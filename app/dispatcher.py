@@ -16,20 +16,20 @@ import queue
 import secrets
 import threading
 import time
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import Any
 
 from ..engine.errors import RideError
 from . import logs
+from .active_job import LAST, ActiveJob, chosen
 from .cluster import Cluster
 from .errors import NotFound, Unavailable
 from .job_kinds import PROMPT, Kind, Progress
-from .job_store import Beat, Job
+from .job_store import Beat
 from .store import Store
 from .worker import Ending
 
@@ -52,48 +52,6 @@ many of sessions that have none among them.
 """
 
 GATHERERS = 2
-
-LAST = ""
-"""The unit that makes the result of all others."""
-
-
-@dataclass
-class _Active:
-    """A job that this process has claimed.
-
-    gather_at : when its payload is to be gathered, s; infinite once that has begun
-    payload : None until it is gathered
-    slow : whether its units hold a worker for long
-    waiting : units that are not sent;  running : those that are
-    kept : names of the parts
-    progress : of the units
-    lost : how often a unit went with its worker
-    """
-
-    job: Job
-    kind: Kind
-    gather_at: float = 0.0
-    payload: Any = None
-    slow: bool = False
-    waiting: deque[str] = field(default_factory=deque)
-    running: set[str] = field(default_factory=set)
-    kept: set[str] = field(default_factory=set)
-    progress: dict[str, Progress] = field(default_factory=dict)
-    lost: Counter[str] = field(default_factory=Counter)
-    started: bool = False
-    cancelled: bool = False
-
-    @property
-    def cut_short(self) -> bool:
-        """Whether a result is made of its parts although it is cancelled."""
-        return self.kind.division is not None and self.kind.division.cut_short
-
-    @property
-    def next(self) -> str | None:
-        """The unit to be sent next, if there is one."""
-        if self.payload is None or self.running and not self.waiting:
-            return None
-        return self.waiting[0] if self.waiting else LAST
 
 
 class Closing(Exception):
@@ -123,7 +81,7 @@ class Dispatcher:
         self._changed = changed
         self._ready, self._taking = ready, taking
         self._runner = secrets.token_hex(8)
-        self._active: dict[str, _Active] = {}
+        self._active: dict[str, ActiveJob] = {}
         self._progress: dict[str, Progress] = {}
         self._saved: dict[str, Progress] = {}
         self._looked = self._recorded = self._away_until = 0.0
@@ -212,7 +170,7 @@ class Dispatcher:
                 log.exception("jobs wait")
                 self._closing.wait(RETRY_AFTER)
 
-    def _hear(self, task: str, then: Callable[[_Active, str], None]) -> None:
+    def _hear(self, task: str, then: Callable[[ActiveJob, str], None]) -> None:
         """Put what a task tells into the queue; of a job that is no longer ours it is nothing."""
         job, _, unit = task.partition("/")
 
@@ -254,7 +212,7 @@ class Dispatcher:
         for job in self._store.jobs.claim(
             self._runner, room, kinds=self._kinds.keys(), known=known, **of
         ):
-            active = self._active[job.id] = _Active(job, self._kinds[job.kind])
+            active = self._active[job.id] = ActiveJob(job, self._kinds[job.kind])
             if active.kind.division is None:
                 active.lost[LAST] = job.attempts
             if job.cancel_asked:
@@ -267,7 +225,7 @@ class Dispatcher:
                 active.gather_at = math.inf
                 self._gatherers.submit(self._gather, active)
 
-    def _gather(self, active: _Active) -> None:
+    def _gather(self, active: ActiveJob) -> None:
         """In a thread of its own, because files may have to be read."""
         job, division = active.job, active.kind.division
         try:
@@ -288,10 +246,10 @@ class Dispatcher:
         else:
             self._news.put(lambda: self._gathered(active, payload, units, slow))
 
-    def _gather_later(self, active: _Active) -> None:
+    def _gather_later(self, active: ActiveJob) -> None:
         active.gather_at = time.monotonic() + RETRY_AFTER
 
-    def _gathered(self, active: _Active, payload: Any, units: Sequence[str], slow: bool) -> None:
+    def _gathered(self, active: ActiveJob, payload: Any, units: Sequence[str], slow: bool) -> None:
         if self._active.get(active.job.id) is not active:
             return
         for name, progress in self._written(lambda: self._store.parts(active.job.id)).items():
@@ -305,32 +263,21 @@ class Dispatcher:
 
     def _send_all(self) -> None:
         """Send units while there is room; nothing while the workers cannot be reached."""
-        if time.monotonic() < self._away_until or self._choose(any_width=True) is None:
+        if time.monotonic() < self._away_until or not any(
+            one.next is not None for one in self._active.values()
+        ):
             return
         try:
             self._width = self._cluster.width()
-            while not self._closing.is_set() and (active := self._choose()) is not None:
+            while not self._closing.is_set() and (active := self._chosen()) is not None:
                 self._send(active)
         except Unavailable:
             self._away_until = time.monotonic() + RETRY_AFTER
 
-    def _choose(self, *, any_width: bool = False) -> _Active | None:
-        """The job whose unit is sent next, if there is room."""
-        running = [one for one in self._active.values() for _ in one.running]
-        if len(running) >= self._width and not any_width:
-            return None
-        busy = Counter(one.job.session for one in running)
-        slow = sum(one.slow for one in running) >= max(1, self._width - 1)
-        waiting = (
-            one for one in self._active.values() if one.next is not None and not (slow and one.slow)
-        )
-        return min(
-            waiting,
-            key=lambda one: (-one.job.priority, busy[one.job.session], one.job.created),
-            default=None,
-        )
+    def _chosen(self) -> ActiveJob | None:
+        return chosen(self._active.values(), self._width)
 
-    def _send(self, active: _Active) -> None:
+    def _send(self, active: ActiveJob) -> None:
         unit, job, kind = active.next, active.job, active.kind
         assert unit is not None
         task, payload, kept = kind.task, active.payload, {}
@@ -352,12 +299,12 @@ class Dispatcher:
             active.waiting.popleft()
         active.running.add(unit)
 
-    def _started(self, active: _Active) -> None:
+    def _started(self, active: ActiveJob) -> None:
         if not active.started:
             active.started = True
             self._written(lambda: self._store.jobs.start(active.job.id, self._runner))
 
-    def _tell(self, active: _Active, unit: str, progress: Progress) -> None:
+    def _tell(self, active: ActiveJob, unit: str, progress: Progress) -> None:
         active.progress[unit] = progress
         division = active.kind.division
         if division is not None:
@@ -366,12 +313,12 @@ class Dispatcher:
             progress = division.progress(active.job.spec, active.progress, len(active.running))
         self._progress[active.job.id] = progress
 
-    def _keep(self, active: _Active, part: str, data: bytes, progress: Progress) -> None:
+    def _keep(self, active: ActiveJob, part: str, data: bytes, progress: Progress) -> None:
         name = _KEPT_BY + part
         if self._written(lambda: self._store.keep_part(active.job.id, name, data, progress)):
             active.kept.add(part)
 
-    def _ended(self, active: _Active, unit: str, ending: Ending) -> None:
+    def _ended(self, active: ActiveJob, unit: str, ending: Ending) -> None:
         active.running.discard(unit)
         if ending["state"] == "cancelled" and not active.cancelled:
             # Nobody asked it to stop, as long as the job is ours.
@@ -394,7 +341,7 @@ class Dispatcher:
             self._tell(active, unit, progress)
         self._conclude(active)
 
-    def _lost(self, active: _Active, unit: str, with_worker: bool) -> None:
+    def _lost(self, active: ActiveJob, unit: str, with_worker: bool) -> None:
         active.running.discard(unit)
         if active.cancelled:
             self._conclude(active)
@@ -420,7 +367,7 @@ class Dispatcher:
             self._stop(active)
         self._conclude(active)
 
-    def _conclude(self, active: _Active) -> None:
+    def _conclude(self, active: ActiveJob) -> None:
         """End a job that is cancelled once nothing of it runs, and it is known that no result is
         made of its parts.
         """
@@ -429,16 +376,16 @@ class Dispatcher:
         if not active.cut_short or active.payload is not None and not active.kept:
             self._finish(active, "cancelled", progress=self._progress.get(active.job.id))
 
-    def _fail(self, active: _Active, code: str, detail: str) -> None:
+    def _fail(self, active: ActiveJob, code: str, detail: str) -> None:
         self._finish(active, "failed", error={"code": code, "detail": detail})
 
-    def _finish(self, active: _Active, state: str, **found: Any) -> None:
+    def _finish(self, active: ActiveJob, state: str, **found: Any) -> None:
         job = active.job.id
         if self._active.get(job) is active:
             self._written(lambda: self._store.finish_job(job, state, **found))
             self._let_go(active)
 
-    def _let_go(self, active: _Active) -> None:
+    def _let_go(self, active: ActiveJob) -> None:
         """Forget a job, and stop what still runs of it."""
         del self._active[active.job.id]
         for known in (self._progress, self._saved):
@@ -447,7 +394,7 @@ class Dispatcher:
         self._stop(active)
         self._changed(active.job.id)
 
-    def _stop(self, active: _Active) -> None:
+    def _stop(self, active: ActiveJob) -> None:
         for unit in active.running:
             with suppress(RuntimeError):  # none is called while the service ends
                 task = _task(active.job.id, unit)
