@@ -1,6 +1,6 @@
 """Advice on what to drive next: what the request means, what it may cost, what comes back.
 
-Imported with the first request, because it brings numba and scipy.
+This happens in a simulator, and brings numba and scipy.
 """
 
 from collections.abc import Mapping
@@ -14,25 +14,26 @@ from ..engine.manoeuvre import Manoeuvre, manoeuvre_from_json
 from ..engine.vehicle_file import vehicle_from_json
 from .errors import InvalidRequest, OverBudget
 from .excitation import known_manoeuvre
-from .identification_job import UNTOLD, build_problem, done, fitted_recordings, marked_runs
+from .identification_job import UNTOLD, build_problem, done, marked_runs
 from .job_store import Job
-from .recordings import Recordings
+from .measurement import Measurement
 from .schemas import AdviceRequest
 from .settings import Limits
-from .store import Store
+from .simulator import Host
 
 
-def advice(
+def advised(
+    host: Host,
     request: AdviceRequest,
-    session: str,
+    vehicle: Mapping[str, Any],
     fitted: Job | None,
-    store: Store,
-    recordings: Recordings,
+    kept: list[Measurement],
     limits: Limits,
 ) -> dict[str, Any]:
     """The advice as JSON.
 
-    fitted : the identification whose runs are known, if the request names one
+    vehicle : the request's or the session's
+    fitted : the identification whose runs are known, if the request names one;  kept : these runs
     """
     candidates = _candidates(request)
     total = sum(one.duration for one in candidates.values())
@@ -42,10 +43,11 @@ def advice(
             f"{limits.advised_seconds:g} s; name fewer or shorter ones."
         )
     if fitted is None:
-        data = store.sessions.get(session).vehicle if request.vehicle is None else request.vehicle
-        vehicle = vehicle_from_json(data)
         found = advise_unmeasured(
-            vehicle, candidates, planned=request.planned, noise=_checked(request.noise)
+            vehicle_from_json(vehicle),
+            candidates,
+            planned=request.planned,
+            noise=_checked(request.noise),
         )
         return advisory_to_json(found)
     if request.vehicle is not None or request.noise:
@@ -57,8 +59,7 @@ def advice(
     fit = done(fitted)
     require_sound(fit)
     spec = {**UNTOLD, **fitted.spec, "vehicle": fit["vehicle"], "start": {}}
-    kept = fitted_recordings(fitted, store)
-    problem = build_problem(spec, marked_runs(spec, kept, recordings)).as_fitted(fit)
+    problem = build_problem(spec, marked_runs(spec, kept, host.recordings)).as_fitted(fit)
     return advisory_to_json(advise(problem, candidates, planned=request.planned))
 
 

@@ -17,6 +17,7 @@ from .job_store import Job
 from .plants import Known, known_plant
 from .schemas import CampaignRequest
 from .settings import Limits
+from .simulator import Host
 from .worker import Attempt, CutShort, WithFile
 
 if TYPE_CHECKING:
@@ -45,9 +46,9 @@ def campaign() -> Kind:
 
 
 def check_and_fill(
-    request: CampaignRequest, vehicle: Mapping[str, Any], limits: Limits
+    host: Host, request: CampaignRequest, vehicle: Mapping[str, Any], limits: Limits
 ) -> dict[str, Any]:
-    """Everything that the job needs, checked, with what holds untold filled in.
+    """In a simulator: everything that the job needs, checked, with what holds untold filled in.
 
     vehicle : of the session, where the request has none
     """
@@ -74,7 +75,8 @@ def check_and_fill(
     planned = _planned(spec)
     _check_budget(planned, known, limits)
     car = vehicle_to_json(planned.plant.vehicle) if known.takes_vehicle else None
-    return {**spec, "vehicle": car, "most_bytes": most_bytes(planned)}
+    told = {"drives": list(planned.manoeuvres), "slow": planned.plant.long}
+    return {**spec, **told, "vehicle": car, "most_bytes": most_bytes(planned)}
 
 
 def _chosen(asked: Iterable[str] | Mapping[str, Any]) -> dict[str, Any]:
@@ -140,13 +142,13 @@ def most_bytes(planned: "Campaign") -> int:
 
 
 def _drives(spec: Mapping[str, Any]) -> list[str]:
-    """Names of the recordings."""
-    return list(_planned(spec).manoeuvres)
+    """Names of the recordings; a job kept from before they were told is planned anew."""
+    return spec["drives"] if "drives" in spec else list(_planned(spec).manoeuvres)
 
 
 def _slow(spec: Mapping[str, Any]) -> bool:
     """Whether a drive takes longer than a person waits."""
-    return _planned(spec).plant.long
+    return spec["slow"] if "slow" in spec else _planned(spec).plant.long
 
 
 def _progress(spec: Mapping[str, Any], drives: Mapping[str, Progress], at_once: int) -> Progress:

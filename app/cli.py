@@ -111,14 +111,17 @@ def _compiling(run: Callable[[argparse.Namespace], None]) -> Callable[[argparse.
 
 
 def _serve(options: argparse.Namespace) -> None:
-    from .serve import serve
+    from .forking import load_early
     from .settings import Settings
 
-    serve(
-        Settings.from_environment(
-            host=options.host, port=options.port, data=options.data, login=options.login
-        )
+    settings = Settings.from_environment(
+        host=options.host, port=options.port, data=options.data, login=options.login
     )
+    load_early(settings.data)
+
+    from .serve import serve
+
+    serve(settings)
 
 
 def _link(options: argparse.Namespace) -> None:

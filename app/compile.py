@@ -88,12 +88,5 @@ def compiling_told() -> Iterator[None]:
         yield
 
 
-def is_compiled() -> bool:
-    """Whether the cache on disk holds anything for these sources."""
-    from ..engine.jit import cache_folder
-
-    return any(cache_folder().rglob("*.nbi"))
-
-
 if __name__ == "__main__":
     PARTS[sys.argv[1]]()

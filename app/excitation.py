@@ -6,7 +6,6 @@ Imported with the first of them, because it brings numba and scipy.
 from collections.abc import Sequence
 from dataclasses import replace
 from difflib import get_close_matches
-from typing import Literal
 
 from ..engine.manoeuvre import Manoeuvre, manoeuvre_from_json, reference_manoeuvres
 from ..engine.roads.road_specs import road_spec_from_json
@@ -16,49 +15,12 @@ from ..engine.simulation.recorded_motion import RecordedMotion, recorded_motion
 from ..engine.simulation.simulate import SAMPLE_STEP, default_step
 from ..engine.vehicle import Vehicle
 from .errors import InvalidRequest, NotFound
-from .measurement_store import Measurement
-from .recordings import Recordings, with_braking
+from .lent_recordings import LentRecordings
+from .measurement import Measurement
+from .runs import with_braking
 from .schemas import ExcitationForm
-from .store import Store
-
-Mode = Literal["manoeuvre", "rims", "posts"]
-MODES: tuple[Mode, ...] = ("manoeuvre", "rims", "posts")
 
 DEFAULT_MANOEUVRE = "2"
-
-RECORDED = "the recording has its own; leave it out"
-MEANS_NOTHING: dict[Mode, dict[str, str]] = {
-    "manoeuvre": {},
-    "rims": {
-        "road": "the recording has its road in it; leave it out",
-        "duration": RECORDED,
-        "lift_off": "tyres play no part; leave it out",
-        "step": "give it as rims.settings.step",
-        "sample_step": "the result has the recording's own times; leave it out",
-    },
-    "posts": {"road": "a rig has none; leave it out", "duration": RECORDED},
-}
-"""By mode, what of a request would change nothing, and the remedy."""
-
-
-def mode_of(request: ExcitationForm) -> Mode:
-    """What a request lets the car go through; InvalidRequest for what means nothing with it."""
-    asked: list[Mode] = [name for name in MODES if getattr(request, name) is not None]
-    if len(asked) > 1:
-        raise InvalidRequest(f"The request has {' and '.join(asked)}; leave one of them.")
-    mode = asked[0] if asked else "manoeuvre"
-    for name, remedy in MEANS_NOTHING[mode].items():
-        if getattr(request, name) not in (None, False):
-            raise InvalidRequest(
-                f"The field {name} means nothing with {mode}: {remedy}.", field=name
-            )
-    return mode
-
-
-def recording_of(request: ExcitationForm, session: str, store: Store) -> Measurement | None:
-    """The measurement that moves the car, if one does."""
-    asked = request.rims or request.posts
-    return None if asked is None else store.measurements.get(session, asked.measurement)
 
 
 def manoeuvre_of(request: ExcitationForm) -> Manoeuvre:
@@ -87,7 +49,7 @@ def known_manoeuvre(key: str) -> Manoeuvre:
 
 
 def recording_in(
-    request: ExcitationForm, kept: Measurement, recordings: Recordings
+    request: ExcitationForm, kept: Measurement, recordings: LentRecordings
 ) -> Run | RecordedMotion:
     """The recording of a request from memory: the motion of the rims, or the run with the posts."""
     if request.rims is None:

@@ -34,6 +34,8 @@ HISTORIES: dict[str, Form] = {
 
 MEDIA_TYPES: dict[str, Form] = {**HISTORIES, "text/csv": "csv"}
 
+MEDIA_TYPE_OF = {form: name for name, form in MEDIA_TYPES.items()}
+
 SIDES = ("lower", "upper")
 """Ends of a band."""
 
@@ -140,10 +142,10 @@ def _text(head: Mapping[str, Any]) -> str:
         return json.dumps(clean(head), separators=(",", ":"))
 
 
-def to_json(head: Mapping[str, Any], frames: Frames) -> dict[str, Any]:
+def to_json(head: Mapping[str, Any], frames: Frames) -> bytes:
     """The head with `values`, numbers that are not finite as null."""
-    values = {name: clean(column.tolist()) for name, column in frames.columns.items()}
-    return clean(_complete(head, frames)) | {"values": values}
+    values = {name: column.tolist() for name, column in frames.columns.items()}
+    return _text({**_complete(head, frames), "values": values}).encode()
 
 
 def _complete(head: Mapping[str, Any], frames: Frames) -> dict[str, Any]:

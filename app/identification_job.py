@@ -5,7 +5,7 @@ database nor the data directory and may be another machine.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from ..engine.parameters import ALL_NAMES, PARAMETER_NAMES, parameter
@@ -13,10 +13,12 @@ from ..engine.run import Run
 from .errors import Conflict, OverBudget
 from .job_kinds import Kind, digest
 from .job_store import Job
-from .measurement_store import Measurement
-from .recordings import Recordings, as_stated, with_braking
+from .measurement import Measurement
+from .recordings import Recordings, as_stated
+from .runs import Runs, with_braking
 from .schemas import IdentificationRequest
 from .settings import Limits
+from .simulator import Host
 from .store import Store
 from .worker import Attempt, Task
 
@@ -57,8 +59,15 @@ def as_asked(request: IdentificationRequest) -> str:
     return digest(form)
 
 
-def filled_in(spec: Mapping[str, Any], problem: Any) -> dict[str, Any]:
-    """The spec with what holds where nothing is told, so that it means the same for ever."""
+def filled_in(
+    host: Host, spec: Mapping[str, Any], kept: list[Measurement], limits: Limits
+) -> dict[str, Any]:
+    """In a simulator: the spec, checked, with what holds where nothing is told, so that it means
+    the same for ever.
+    """
+    step, starts, fit_noise = spec["settings"]["step"], spec["starts"], spec["fit_noise"]
+    check_budget(kept, step, limits, starts=starts, fit_noise=fit_noise)
+    problem = build_problem(spec, marked_runs(spec, kept, host.recordings))
     free = [one.name for one in problem.free]
     started = {*free, *(parameter(name).name for name in spec["start"])}
     return {
@@ -78,7 +87,7 @@ def fitted_recordings(fitted: Job, store: Store) -> list[Measurement]:
 
 
 def marked_runs(
-    spec: Mapping[str, Any], kept: list[Measurement], recordings: Recordings
+    spec: Mapping[str, Any], kept: Iterable[Measurement], recordings: Runs
 ) -> list[Run]:
     """The recordings, with their braking where the request marks it."""
     return [with_braking(recordings.run(one), spec["braking"].get(one.id)) for one in kept]

@@ -53,6 +53,7 @@ from .recordings import Recordings
 from .services import Services, Viewers
 from .services_metrics import ServicesCollector
 from .settings import Limits, Settings
+from .simulators import Simulators
 from .store import Store
 from .sweep_job import KIND as SWEEP
 from .sweep_job import sweep
@@ -62,6 +63,8 @@ from .warmup import WarmUp, ready_to_simulate
 
 log = logging.getLogger(__name__)
 
+CORES = os.cpu_count() or 1
+
 REAPS = 10
 """How often, while a viewer without a tab is kept, those that are due are looked for."""
 
@@ -70,7 +73,7 @@ def create_app(
     settings: Settings,
     *,
     store: Store | None = None,
-    warm_up: Callable[[WarmUp], object] = ready_to_simulate,
+    warm_up: Callable[[WarmUp, Simulators], object] = ready_to_simulate,
 ) -> FastAPI:
     """The service; its data directory is locked from here or from start-up until it stops."""
 
@@ -146,19 +149,21 @@ def create_app(
 def _services(
     settings: Settings,
     store: Store | None,
-    warm_up: Callable[[WarmUp], object],
+    warm_up: Callable[[WarmUp, Simulators], object],
     draining: Draining,
     metrics: Metrics,
 ) -> Services:
     store = store or Store(settings.data, settings.limits, settings.database)
     cluster = Cluster(settings.cluster, store.directory.scratch, certificates=settings.certificates)
     recordings = Recordings(store)
-    warmup = WarmUp(warm_up)
+    simulators = Simulators(CORES, recordings.run)
+    warmup = WarmUp(lambda warmup: warm_up(warmup, simulators))
     return Services(
         settings=settings,
         store=store,
         recordings=recordings,
         interactive=interactive(settings.limits, partial(metrics.worked, "interactive")),
+        simulators=simulators,
         readers=readers(settings.limits, partial(metrics.worked, "readers")),
         cluster=cluster,
         jobs=Jobs(
@@ -186,13 +191,11 @@ def _services(
 
 
 def interactive(limits: Limits, worked: Callable[[float, float], None]) -> Pool:
-    """As wide as the cores: a wider one would not compute faster, it would only take the event
-    loop's share of Python's lock.
-    """
+    """As wide as there are simulators."""
     share = limits.session_simulations
     return Pool(
         "simulations",
-        os.cpu_count() or 1,
+        CORES,
         share=share,
         most=limits.waiting_simulations,
         at_once=share,
@@ -230,6 +233,7 @@ def _close(services: Services) -> None:
         # Jobs are handed back once no request adds one any more.
         last_first.callback(services.jobs.close)
         last_first.callback(services.readers.close)
+        last_first.callback(services.simulators.close)
         last_first.callback(services.interactive.close)
         last_first.callback(services.warmup.close)
 

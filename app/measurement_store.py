@@ -1,10 +1,9 @@
-"""Measurements: recordings that were uploaded, what was found in them and what is told of them."""
+"""Where measurements are kept: rows of the database, and their originals on disk."""
 
 import json
 import secrets
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,48 +14,12 @@ from .database import Database
 from .errors import Busy, Conflict, NotFound
 from .file_store import FileStore
 from .job_store import JobStore
+from .measurement import Measurement, NewMeasurement
 from .session_row import lock_session, mark_used
 from .settings import Limits
 from .tables import measurements, uploads
 
 ABSENT = "There is no measurement with that id in this session."
-
-
-@dataclass(frozen=True)
-class Measurement:
-    """One uploaded recording.
-
-    summary : what was found in it
-    manoeuvre : what was driven
-    mapping : which of its columns are which channels where their names do not say it
-    conditioning : what is done to it before it is used, {"steps": [...], "vehicle": {...} or None}
-    conditioned : what its notes say was done to it before it came here, a list of step records
-    """
-
-    id: str
-    name: str
-    sha256: str
-    bytes: int
-    created: float
-    sample: bool
-    noise: dict[str, float]
-    summary: dict[str, Any]
-    manoeuvre: dict[str, Any] | None
-    mapping: dict[str, Any] | None
-    conditioning: dict[str, Any] | None
-    conditioned: list[dict[str, Any]] | None
-
-
-@dataclass(frozen=True)
-class NewMeasurement:
-    """A recording to be kept, already parsed."""
-
-    name: str
-    data: bytes
-    summary: Mapping[str, Any]
-    noise: Mapping[str, float]
-    sample: bool = False
-    manoeuvre: Mapping[str, Any] | None = None
 
 
 class MeasurementStore:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Any
 
-from .measurement_store import Measurement
+from .measurement import Measurement
 from .store import Store
 
 

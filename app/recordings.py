@@ -1,15 +1,14 @@
 """Measurement files as runs: parsed once, kept in memory while they are in use, summed up.
 
-The original on disk stays the truth; a run here can always be read again from it under its mapping,
-and the motion that it prescribes to every car made again. A file whose columns have names of their
-own is kept, too, and is no run until it has a mapping. Whoever reads a file here waits until a
-child may be started, so that there are never more of them than the settings allow.
+The original on disk stays the truth; a run here can always be read again from it under its mapping.
+A file whose columns have names of their own is kept, too, and is no run until it has a mapping.
+Whoever reads a file here waits until a child may be started, so that there are never more of them
+than the settings allow.
 """
 
 import hashlib
-import json
 import threading
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -23,10 +22,10 @@ from ..engine.errors import MeasurementError, UnmappedError
 from ..engine.remembered import Remembered
 from ..engine.run import Run
 from ..engine.run_notes import doubtful_noise
-from ..engine.simulation.rims_settings import RimsSettings
 from ..engine.step_record import step_records_from_json
 from .errors import Deleted, NotFound
-from .measurement_store import Measurement, NewMeasurement
+from .measurement import Measurement, NewMeasurement, done_to, read_as
+from .runs import size
 from .storage import trouble_of
 from .store import Store
 
@@ -34,10 +33,9 @@ if TYPE_CHECKING:
     from ..engine.formats.child import Bounds, ChildTable
     from ..engine.formats.table import Table
     from ..engine.mapping.survey import Survey
-    from ..engine.simulation.recorded_motion import RecordedMotion
 
 REMEMBERED_VALUES = 8_000_000
-"""Numbers kept in memory over all runs, and as many over all motions: 64 MB."""
+"""Numbers kept in memory over all runs: 64 MB, and as much of conditioned ones."""
 
 ANSWER = 3.0
 """Times its processor time that a process which reads a file has for an answer."""
@@ -47,7 +45,7 @@ REMEMBERED_COLUMNS = 20_000
 
 
 class Recordings:
-    """Runs of measurements and what they prescribe, the most recently used ones in memory."""
+    """Runs of measurements, the most recently used ones in memory."""
 
     def __init__(self, store: Store):
         self._store = store
@@ -56,7 +54,6 @@ class Recordings:
         self._runs: Remembered[Any, Run] = Remembered(REMEMBERED_VALUES)
         self._conditioned: Remembered[Any, Run] = Remembered(REMEMBERED_VALUES)
         self._surveys: Remembered[Any, Survey] = Remembered(REMEMBERED_COLUMNS)
-        self._motions: Remembered[Any, RecordedMotion] = Remembered(REMEMBERED_VALUES)
 
     def run(self, measurement: Measurement) -> Run:
         """The recording as it is used: with what is done to it, as `raw` where that is nothing."""
@@ -72,7 +69,7 @@ class Recordings:
             vehicle = asked["vehicle"] and vehicle_from_json(asked["vehicle"])
             return condition(self.raw(measurement), steps_from_json(asked["steps"]), vehicle)
 
-        return self._conditioned.made(_done_to(measurement), conditioned, _size)
+        return self._conditioned.made(done_to(measurement), conditioned, size)
 
     def raw(self, measurement: Measurement) -> Run:
         """The parsed recording under the measurement's name and mapping, with its noise;
@@ -82,7 +79,7 @@ class Recordings:
             raise UnmappedError(
                 f"{measurement.name}: its columns are not mapped to channels; map them first."
             )
-        run = self._runs.made(_key(measurement), lambda: self.parse(measurement), _size)
+        run = self._runs.made(read_as(measurement), lambda: self.parse(measurement), size)
         done = run.conditioning
         if measurement.conditioned is not None:
             done = step_records_from_json(measurement.conditioned, measurement.name)
@@ -99,30 +96,8 @@ class Recordings:
         """Whether `run` gives the recording from memory, without a child."""
         done = None
         if measurement.conditioning is not None:
-            done = self._conditioned.get(_done_to(measurement))
-        return done is not None or self._runs.get(_key(measurement)) is not None
-
-    def motion(
-        self,
-        measurement: Measurement,
-        settings: RimsSettings,
-        braking: Iterable[tuple[float, float]] | None,
-    ) -> "RecordedMotion":
-        """What the recording prescribes to every car, with its braking marked, if it is marked.
-
-        Noise and marks are no part of the motion, so that it outlives a change of them, but for
-        noise that conditioning asks for.
-        """
-        # It brings scipy, which is loaded with the first simulation.
-        from ..engine.simulation.recorded_motion import recorded_motion
-
-        run = with_braking(self.run(measurement), braking)
-        motion = self._motions.made(
-            (_done_to(measurement), settings),
-            lambda: recorded_motion(run, settings),
-            lambda made: made.stage_inputs.size,
-        )
-        return replace(motion, run=run)
+            done = self._conditioned.get(done_to(measurement))
+        return done is not None or self._runs.get(read_as(measurement)) is not None
 
     def survey(self, measurement: Measurement) -> "Survey":
         """What is in the file, whether it has a mapping or not."""
@@ -228,11 +203,6 @@ def named_car(first: Mapping[str, Any], then: Mapping[str, Any]) -> dict[str, st
     return {name: first.get(name) or then.get(name) for name in ("vehicle", "plant")}
 
 
-def _size(run: Run) -> int:
-    """Numbers in a run."""
-    return run.time.size * (1 + len(run.columns))
-
-
 def _run(table: "Table", mapping: Mapping[str, Any] | None, noise: Mapping[str, float]) -> Run:
     """The run in a table.
 
@@ -247,31 +217,6 @@ def _run(table: "Table", mapping: Mapping[str, Any] | None, noise: Mapping[str, 
     from ..engine.mapping.reading import mapped_run
 
     return mapped_run(table, mapping_from_json(mapping), noise, "")
-
-
-def _key(measurement: Measurement) -> tuple[str, str, str]:
-    """What a parsed recording is made of; its name heads its messages and may tell its kind."""
-    mapping = json.dumps(measurement.mapping, sort_keys=True)
-    return measurement.sha256, measurement.name, mapping
-
-
-def _done_to(measurement: Measurement) -> tuple[Any, ...]:
-    """What stands for a measurement's file and what is done to it."""
-    done = json.dumps([measurement.conditioned, measurement.conditioning], sort_keys=True)
-    noise = () if measurement.conditioning is None else sorted(measurement.noise.items())
-    return *_key(measurement), done, *noise
-
-
-def stated(measurement: Measurement) -> dict[str, Any]:
-    """What a job keeps of a measurement, so that it means the same for ever."""
-    return {
-        "id": measurement.id,
-        "name": measurement.name,
-        "noise": measurement.noise,
-        "mapping": measurement.mapping,
-        "conditioning": measurement.conditioning,
-        "conditioned": measurement.conditioned,
-    }
 
 
 def as_stated(
@@ -294,11 +239,6 @@ def as_stated(
         conditioning=kept.get("conditioning"),
         conditioned=kept.get("conditioned"),
     )
-
-
-def with_braking(run: Run, intervals: Iterable[tuple[float, float]] | None) -> Run:
-    """The run with its braking marked, if it is marked."""
-    return run if intervals is None else replace(run, braking=tuple(map(tuple, intervals)))
 
 
 def summary(

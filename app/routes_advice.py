@@ -1,11 +1,14 @@
 """Advice on what to drive next, given at once."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from fastapi import APIRouter
 
 from .access import SessionId
 from .identification_job import KIND as IDENTIFICATION
+from .identification_job import fitted_recordings
+from .interactive import advised
 from .schemas import AdviceRequest
 from .services import Services, Shared
 from .strict_json import StrictRoute
@@ -14,16 +17,21 @@ router = APIRouter(prefix="/api/sessions/{sid}/advice", tags=["advice"], route_c
 
 
 @router.post("")
-async def advise(sid: SessionId, services: Shared, body: AdviceRequest) -> dict[str, Any]:
+async def advise(sid: SessionId, services: Shared, body: AdviceRequest) -> Mapping[str, Any]:
     """Rank manoeuvres by what they would do to the weakest parameters."""
     services.warmup.require()
     return await services.interactive.run(sid, lambda: _advice(services, sid, body))
 
 
-def _advice(services: Services, sid: str, body: AdviceRequest) -> dict[str, Any]:
-    from .advice import advice
-
-    asked = body.identification
+def _advice(services: Services, sid: str, body: AdviceRequest) -> Mapping[str, Any]:
+    store, asked = services.store, body.identification
     fitted = None if asked is None else services.jobs.get(sid, asked, IDENTIFICATION)
-    store, limits = services.store, services.settings.limits
-    return advice(body, sid, fitted, store, services.recordings, limits)
+    return services.simulators.run(
+        sid,
+        advised,
+        body,
+        store.sessions.get(sid).vehicle if body.vehicle is None else body.vehicle,
+        fitted,
+        [] if fitted is None else fitted_recordings(fitted, store),
+        services.settings.limits,
+    )

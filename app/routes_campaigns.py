@@ -16,7 +16,7 @@ from .errors import Conflict, NotFound
 from .job_kinds import as_asked
 from .job_routes import View, job_router, submitted
 from .job_store import Job
-from .measurement_store import Measurement, NewMeasurement
+from .measurement import Measurement, NewMeasurement
 from .measurement_view import measurements_to_json
 from .schemas import CampaignRequest
 from .services import Services, Shared
@@ -56,7 +56,8 @@ async def submit(sid: SessionId, services: Shared, body: CampaignRequest) -> dic
 def _spec(services: Services, sid: str, body: CampaignRequest) -> dict[str, Any]:
     """Everything that the job needs, checked."""
     store = services.store
-    spec = check_and_fill(body, store.sessions.get(sid).vehicle, services.settings.limits)
+    vehicle, limits = store.sessions.get(sid).vehicle, services.settings.limits
+    spec = services.simulators.run(sid, check_and_fill, body, vehicle, limits)
     store.files.require_room(sid, spec.pop("most_bytes"))
     return spec
 

@@ -6,7 +6,7 @@ from typing import Any
 from fastapi import APIRouter
 
 from .access import SessionId
-from .measurement_store import Measurement
+from .measurement import Measurement
 from .measurement_view import measurement_to_json
 from .schemas import ConditioningRequest
 from .services import Services, Shared

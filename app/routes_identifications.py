@@ -9,13 +9,10 @@ from .identification_job import (
     KIND,
     UNTOLD,
     as_asked,
-    build_problem,
-    check_budget,
     filled_in,
-    marked_runs,
 )
 from .job_routes import View, job_router, submitted
-from .recordings import stated
+from .measurement import stated
 from .schemas import IdentificationRequest
 from .services import Services, Shared
 
@@ -47,13 +44,6 @@ async def submit(sid: SessionId, services: Shared, body: IdentificationRequest) 
 def _spec(services: Services, sid: str, body: IdentificationRequest) -> dict[str, Any]:
     """Everything that the job needs, checked."""
     kept = [services.store.measurements.get(sid, measurement) for measurement in body.runs]
-    check_budget(
-        kept,
-        body.settings.step,
-        services.settings.limits,
-        starts=body.starts,
-        fit_noise=body.fit_noise,
-    )
     vehicle = services.store.sessions.get(sid).vehicle if body.vehicle is None else body.vehicle
     spec = body.model_dump(mode="json", exclude={"key", "runs", "vehicle"})
     spec["vehicle"] = vehicle_to_json(vehicle_from_json(vehicle))
@@ -64,4 +54,4 @@ def _spec(services: Services, sid: str, body: IdentificationRequest) -> dict[str
             "add the run.",
             field="braking",
         )
-    return filled_in(spec, build_problem(spec, marked_runs(spec, kept, services.recordings)))
+    return services.simulators.run(sid, filled_in, spec, kept, services.settings.limits)

@@ -12,7 +12,7 @@ from .access import SessionId
 from .columns import candidate_to_json, columns_to_json, preview
 from .downloads import saved_as
 from .errors import NotFound
-from .measurement_store import Measurement
+from .measurement import Measurement
 from .measurement_view import measurement_to_json
 from .schemas import JsonObject, NamedMapping
 from .services import Services, Shared

@@ -15,7 +15,7 @@ from ..engine.step_record import step_record_to_json
 from . import frames
 from .access import SessionId
 from .downloads import saved_as
-from .measurement_store import Measurement
+from .measurement import Measurement
 from .measurement_view import measurement_to_json, measurements_to_json
 from .recordings import named_car
 from .routes_simulations import csv_reply, described, frames_reply

@@ -4,12 +4,14 @@ from collections.abc import Mapping
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
-from fastapi.responses import JSONResponse, StreamingResponse
+from fastapi.responses import StreamingResponse
 
 from . import frames
 from .access import SessionId
-from .errors import InvalidRequest
+from .excitation_mode import mode_of, recording_of
 from .identification_job import KIND as IDENTIFICATION
+from .identification_job import done
+from .interactive import simulated
 from .schemas import SimulationRequest
 from .services import Services, Shared
 from .strict_json import StrictRoute
@@ -42,32 +44,33 @@ async def simulate(
 def _simulated(
     services: Services, sid: str, body: SimulationRequest, form: frames.Form
 ) -> Response:
-    from .simulate import plan, reply
-
-    asked = body.bands
-    fitted = None if asked is None else services.jobs.get(sid, asked.identification, IDENTIFICATION)
-    if asked is not None and form == "csv":
-        raise InvalidRequest("Bands come as JSON or frames; ask for one of them.", field="bands")
-    store, limits = services.store, services.settings.limits
-    task = plan(body, sid, fitted, store, services.recordings, limits)
-    services.callers.simulate(sid, task.seconds)
-    found = reply(body, task)
-    if body.scene and services.viewers is not None:
-        services.viewers.show(sid, task.vehicle)
-    if form == "csv":
-        return csv_reply(found.run)
-    taken, *ends = (
-        frames.take(run, body.channels, body.max_samples, body.decimate)
-        for run in (found.run, *((found.bands.lower, found.bands.upper) if found.bands else ()))
+    mode_of(body)
+    fit = None
+    if body.bands is not None:
+        fit = done(services.jobs.get(sid, body.bands.identification, IDENTIFICATION))
+    store = services.store
+    content, shown = services.simulators.run(
+        sid,
+        simulated,
+        body,
+        form,
+        store.sessions.get(sid).vehicle if body.vehicle is None else body.vehicle,
+        recording_of(body, sid, store),
+        fit,
+        services.settings.limits,
+        charge=lambda seconds: services.callers.simulate(sid, seconds),
     )
-    return frames_reply(found.head, taken.within(*ends) if ends else taken, form)
+    if shown is not None and services.viewers is not None:
+        services.viewers.show(sid, shown)
+    if isinstance(content, bytes):
+        return Response(content, media_type=frames.MEDIA_TYPE_OF[form])
+    return csv_reply(content)
 
 
 def frames_reply(head: dict[str, Any], taken: frames.Frames, form: frames.Form) -> Response:
     """Histories as binary or JSON."""
-    if form == "binary":
-        return Response(frames.to_binary(head, taken), media_type="application/vnd.ridetune.frames")
-    return JSONResponse(frames.to_json(head, taken))
+    written = frames.to_binary if form == "binary" else frames.to_json
+    return Response(written(head, taken), media_type=frames.MEDIA_TYPE_OF[form])
 
 
 def csv_reply(run: Any, headers: Mapping[str, str] | None = None) -> Response:

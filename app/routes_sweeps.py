@@ -9,10 +9,11 @@ from fastapi.responses import FileResponse, Response, StreamingResponse
 
 from .access import SessionId
 from .errors import Conflict
+from .excitation_mode import mode_of, recording_of
 from .job_routes import View, job_router, submitted
 from .schemas import SweepRequest
 from .services import Services, Shared
-from .sweep_job import KIND, as_asked, check_and_fill, most_bytes
+from .sweep_job import KIND, as_asked, check_and_fill
 
 ASKED = (
     *("design", "manoeuvre", "rims", "posts", "road", "duration"),
@@ -50,14 +51,13 @@ async def submit(sid: SessionId, services: Shared, body: SweepRequest) -> dict[s
 
 def _spec(services: Services, sid: str, body: SweepRequest) -> dict[str, Any]:
     """Everything that the job needs, checked."""
-    from .excitation import mode_of, recording_of
-
     mode_of(body)
     store = services.store
     vehicle = store.sessions.get(sid).vehicle if body.vehicle is None else body.vehicle
     kept = recording_of(body, sid, store)
-    spec = check_and_fill(body, vehicle, kept, services.recordings, services.settings.limits)
-    store.files.require_room(sid, most_bytes(body))
+    limits = services.settings.limits
+    spec = services.simulators.run(sid, check_and_fill, body, vehicle, kept, limits)
+    store.files.require_room(sid, spec.pop("most_bytes"))
     return spec
 
 

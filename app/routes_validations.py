@@ -8,6 +8,7 @@ from fastapi.responses import FileResponse, HTMLResponse
 from .access import SessionId
 from .errors import Conflict
 from .identification_job import KIND as IDENTIFICATION
+from .identification_job import done, fitted_recordings
 from .job_kinds import as_asked
 from .job_routes import View, job_router, submitted
 from .report import SERVED_POLICY, report
@@ -39,8 +40,18 @@ async def submit(sid: SessionId, services: Shared, body: ValidationRequest) -> d
 def _spec(services: Services, sid: str, body: ValidationRequest) -> dict[str, Any]:
     """Everything that the job needs, checked."""
     fitted = services.jobs.get(sid, body.identification, IDENTIFICATION)
-    store, limits = services.store, services.settings.limits
-    spec = check_and_fill(body, sid, fitted, store, services.recordings, limits)
+    done(fitted)
+    store = services.store
+    spec = services.simulators.run(
+        sid,
+        check_and_fill,
+        body,
+        fitted,
+        fitted_recordings(fitted, store),
+        [store.measurements.get(sid, one) for one in body.hold_out],
+        store.measurements.of_session(sid),
+        services.settings.limits,
+    )
     store.files.require_room(sid, BYTES_A_RUN * len(spec["runs"]))
     return spec
 

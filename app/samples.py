@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..engine.run_notes import manoeuvre_beside
-from .measurement_store import NewMeasurement
+from .measurement import NewMeasurement
 from .package_files import package_folder
 from .recordings import summary
 

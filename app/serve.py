@@ -1,9 +1,7 @@
 """Run the service until it is told to stop."""
 
-import os
 import resource
 import socket
-from pathlib import Path
 
 import uvicorn
 
@@ -25,7 +23,6 @@ def serve(settings: Settings) -> None:
     """Serve; StartError with a sentence if the address or the data directory cannot be had."""
     logs.configure(settings.log, settings.log_level)
     _allow_many_files()
-    _find_cache(settings)
     with _listen(settings) as listener:
         store = Store(settings.data, settings.limits, settings.database)
         try:
@@ -108,12 +105,3 @@ def _allow_many_files() -> None:
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = FILES if most == resource.RLIM_INFINITY else min(FILES, most)
     resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))
-
-
-def _find_cache(settings: Settings) -> None:
-    """Keep compiled code with the data where the user has no cache, as a system service has not."""
-    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    try:
-        Path(home, "ridetune").mkdir(parents=True, exist_ok=True)
-    except OSError:
-        os.environ.setdefault("RIDETUNE_CACHE", str(settings.data / "cache"))

@@ -16,6 +16,7 @@ from .pool import Pool
 from .readiness import Readiness
 from .recordings import Recordings
 from .settings import Settings
+from .simulators import Simulators
 from .store import Store
 from .warmup import WarmUp
 
@@ -44,7 +45,7 @@ class Viewers(Protocol):
 class Services:
     """One running service.
 
-    interactive : for what a person waits for and takes a core
+    interactive : for what a person waits for and takes a core, in one of the simulators
     readers : for what opens files in children
     """
 
@@ -52,6 +53,7 @@ class Services:
     store: Store
     recordings: Recordings
     interactive: Pool
+    simulators: Simulators
     readers: Pool
     cluster: Cluster
     jobs: Jobs

@@ -12,7 +12,8 @@ from sqlalchemy import Connection, delete, func, insert, select, update
 from .database import Database
 from .errors import NotFound, Unavailable
 from .file_store import FileStore
-from .measurement_store import MeasurementStore, NewMeasurement
+from .measurement import NewMeasurement
+from .measurement_store import MeasurementStore
 from .secret import hashed, new_secret
 from .session_row import GONE
 from .settings import Limits

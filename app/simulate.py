@@ -1,6 +1,6 @@
 """One interactive simulation: what the request means, what it may cost, what comes back.
 
-Imported with the first simulation, because it brings numba and scipy.
+This happens in a simulator, and brings numba and scipy.
 """
 
 import json
@@ -8,67 +8,98 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..engine.channels import channel
-from ..engine.identification.bands import Bands, bands
-from ..engine.identification.kept_fit import fit_from_json
 from ..engine.remembered import Remembered
 from ..engine.run import Run
 from ..engine.simulation.excitation import Excitation
 from ..engine.simulation.metrics import Metric, metrics
 from ..engine.vehicle import Vehicle
 from ..engine.vehicle_file import vehicle_from_json
-from .errors import OverBudget
-from .excitation import excitation_of, extent, mode_of, recording_in, recording_of
-from .identification_job import done
-from .job_store import Job
-from .recordings import Recordings
+from . import frames
+from .errors import InvalidRequest, OverBudget
+from .excitation import excitation_of, extent, recording_in
+from .lent_recordings import LentRecordings
+from .measurement import Measurement
 from .schemas import SimulationRequest
 from .settings import Limits
-from .store import Store
+from .simulator import Host
+
+if TYPE_CHECKING:
+    from ..engine.identification.bands import Bands
 
 USUAL_STEP = 0.0025
 """What a simulated second is charged by, s."""
 
 
+CHARGE = "charge"
+"""What it asks its host: to take so many simulated seconds from the session's budget."""
+
+
 @dataclass(frozen=True)
 class Task:
-    """A checked simulation, ready to run in the pool."""
+    """A checked simulation."""
 
     vehicle: Vehicle
     run: Callable[[], Any]
-    bands: Callable[[], Bands] | None
+    bands: "Callable[[], Bands] | None"
     seconds: float
     """Simulated ones of all cars, at the usual step."""
 
 
 @dataclass(frozen=True)
-class Reply:
+class Found:
     """What a simulation found: the run, and the head that goes before it."""
 
     run: Run
     head: dict[str, Any]
-    bands: Bands | None
+    bands: "Bands | None"
+
+
+def simulated(
+    host: Host,
+    request: SimulationRequest,
+    form: frames.Form,
+    vehicle: Mapping[str, Any],
+    kept: Measurement | None,
+    fit: Mapping[str, Any] | None,
+    limits: Limits,
+) -> tuple[bytes | Run, Vehicle | None]:
+    """In a simulator: the histories in the form that was asked for, of CSV the run to be written;
+    and the car for the session's scene, where the request shows it there.
+
+    vehicle : the request's or the session's;  kept : the recording that moves it, if one does
+    fit : whose errors make the bands, if any are asked for
+    """
+    task = plan(request, vehicle, kept, fit, host.recordings, limits)
+    if fit is not None and form == "csv":
+        raise InvalidRequest("Bands come as JSON or frames; ask for one of them.", field="bands")
+    host.ask(CHARGE, task.seconds)
+    found = run(request, task)
+    shown = task.vehicle if request.scene else None
+    if form == "csv":
+        return found.run, shown
+    taken, *ends = (
+        frames.take(one, request.channels, request.max_samples, request.decimate)
+        for one in (found.run, *((found.bands.lower, found.bands.upper) if found.bands else ()))
+    )
+    written = frames.to_binary if form == "binary" else frames.to_json
+    return written(found.head, taken.within(*ends) if ends else taken), shown
 
 
 def plan(
     request: SimulationRequest,
-    session: str,
-    fitted: Job | None,
-    store: Store,
-    recordings: Recordings,
+    data: Mapping[str, Any],
+    kept: Measurement | None,
+    fit: Mapping[str, Any] | None,
+    recordings: LentRecordings,
     limits: Limits,
 ) -> Task:
-    """The simulation asked for, checked against the work budget; reads what it needs.
-
-    fitted : the identification whose errors make the bands, if any are asked for
-    """
-    mode_of(request)
+    """The simulation asked for, checked against the work budget; arguments as of `simulated`."""
     for name in request.channels or ():
         channel(name)
-    vehicle = _vehicle(request, session, store)
-    kept = recording_of(request, session, store)
+    vehicle = _vehicle(data, request.values)
     duration, steps = extent(request, kept, [vehicle])
     _check_budget(duration, steps, limits)
 
@@ -76,14 +107,18 @@ def plan(
         recording = None if kept is None else recording_in(request, kept, recordings)
         return excitation_of(request, recording)
 
-    def run() -> Any:
+    def drive() -> Any:
         return driven().simulate(vehicle, request.model)
 
     seconds = max(duration, steps * USUAL_STEP)
-    if request.bands is None or fitted is None:
-        return Task(vehicle, run, None, seconds)
-    asked, fit = request.bands, fit_from_json(done(fitted))
-    cars = asked.cars if asked.method == "sampled" else 2 * len(fit.free)
+    if request.bands is None or fit is None:
+        return Task(vehicle, drive, None, seconds)
+    # Not loaded with the rest: sliders move long before a fit is there.
+    from ..engine.identification.bands import bands
+    from ..engine.identification.kept_fit import fit_from_json
+
+    asked, known = request.bands, fit_from_json(fit)
+    cars = asked.cars if asked.method == "sampled" else 2 * len(known.free)
     if steps * (cars + 1) > limits.banded_steps:
         raise OverBudget(
             f"Bands by {cars} cars take {math.ceil(steps * (cars + 1))} steps, at most "
@@ -92,13 +127,13 @@ def plan(
     how: dict[str, Any] = {"cars": asked.cars, "seed": asked.seed, "model": request.model}
     return Task(
         vehicle,
-        run,
-        lambda: bands(fit, vehicle, driven(), method=asked.method, **how),
+        drive,
+        lambda: bands(known, vehicle, driven(), method=asked.method, **how),
         seconds * (cars + 1),
     )
 
 
-def reply(request: SimulationRequest, task: Task) -> Reply:
+def run(request: SimulationRequest, task: Task) -> Found:
     """Run the simulation and sum it up."""
     began = time.perf_counter()
     found = task.run()
@@ -114,13 +149,13 @@ def reply(request: SimulationRequest, task: Task) -> Reply:
         "warnings": [*found.warnings, *(within.warnings if within else ())],
         "seconds": time.perf_counter() - began,
     }
-    return Reply(found.run, head, within)
+    return Found(found.run, head, within)
 
 
 _METRIC = tuple(field.name for field in fields(Metric))
 
 
-def _metric(metric: Metric, within: Bands | None) -> dict[str, Any]:
+def _metric(metric: Metric, within: "Bands | None") -> dict[str, Any]:
     """A figure, with its interval where there are bands; null for an end that is open."""
     told = {name: getattr(metric, name) for name in _METRIC}
     interval = within.figures.get(metric.name) if within else None
@@ -131,13 +166,10 @@ _VEHICLES: Remembered[str, Vehicle] = Remembered(256)
 """Checked vehicles by their JSON."""
 
 
-def _vehicle(request: SimulationRequest, session: str, store: Store) -> Vehicle:
-    data: Mapping[str, Any] = (
-        store.sessions.get(session).vehicle if request.vehicle is None else request.vehicle
-    )
+def _vehicle(data: Mapping[str, Any], values: Mapping[str, float]) -> Vehicle:
     # A slider sends the same car again and again with other values.
     vehicle = _VEHICLES.made(json.dumps(data), lambda: vehicle_from_json(data), lambda _: 1)
-    return vehicle.with_values(request.values) if request.values else vehicle
+    return vehicle.with_values(values) if values else vehicle
 
 
 def _check_budget(duration: float, steps: float, limits: Limits) -> None:

@@ -11,12 +11,14 @@ from dataclasses import asdict
 from typing import Any
 
 from .errors import OverBudget
+from .excitation_mode import mode_of
 from .job_kinds import PATIENT, Division, Kind, Progress, digest
 from .job_store import Job
-from .measurement_store import Measurement
-from .recordings import Recordings, as_stated, stated
+from .measurement import Measurement, stated
+from .recordings import Recordings, as_stated
 from .schemas import FullFactorialForm, SweepRequest
 from .settings import Limits
+from .simulator import Host
 from .store import Store
 from .worker import Attempt, WithFile
 
@@ -69,34 +71,33 @@ def design_of(form: Any) -> Any:
     return make(form.ranges, form.cars, form.seed)
 
 
-def most_bytes(request: SweepRequest) -> int:
+def most_bytes(design: Any) -> int:
     """How large the file can become."""
     from ..engine.sweeps.sweep import columns
 
-    design = design_of(request.design)
     return FRAME_BYTES + design.cars * (8 * len(columns(design)) + STATUS_BYTES)
 
 
 def check_and_fill(
+    host: Host,
     request: SweepRequest,
     vehicle: Mapping[str, Any],
     kept: Measurement | None,
-    recordings: Recordings,
     limits: Limits,
 ) -> dict[str, Any]:
-    """Everything that the job needs, checked, with what holds untold filled in."""
+    """In a simulator: everything that the job needs, checked, with what holds untold filled in."""
     from ..engine.manoeuvre import manoeuvre_to_json
     from ..engine.sweeps.sweep_checks import check_sweep, stepped_alike, threads_of, typical_cars
     from ..engine.sweeps.sweep_file import require_package
     from ..engine.vehicle_file import vehicle_from_json, vehicle_to_json
-    from .excitation import excitation_of, extent, manoeuvre_of, mode_of
+    from .excitation import excitation_of, extent, manoeuvre_of
 
     require_package("parquet")
     mode = mode_of(request)
     car, design = vehicle_from_json(vehicle), design_of(request.design)
     steps = extent(request, kept, typical_cars(car, design))[1]
     _check_budget(design.cars, steps, limits)
-    run = None if kept is None else recordings.run(kept)
+    run = None if kept is None else host.recordings.run(kept)
     driven = excitation_of(request, run)
     check_sweep(car, design, driven, threads_of(None))
     driven = stepped_alike(car, design, driven)
@@ -104,6 +105,7 @@ def check_and_fill(
     spec |= {"vehicle": vehicle_to_json(car), "design": design.to_json(), "cars": design.cars}
     spec["share"] = _share(design.cars, steps)
     spec["runs"] = [] if kept is None else [stated(kept)]
+    spec["most_bytes"] = most_bytes(design)
     if mode != "rims":
         spec |= {name: getattr(driven, name) for name in ("step", "sample_step")}
     if mode == "manoeuvre":

@@ -10,14 +10,15 @@ from typing import Any
 
 from ..engine.vehicle_file import vehicle_from_json
 from .errors import InvalidRequest
-from .identification_job import check_budget, done, fitted_recordings
+from .identification_job import check_budget, done, marked_runs
 from .job_kinds import Kind
 from .job_store import Job
-from .measurement_store import Measurement
+from .measurement import Measurement, stated
 from .measurement_view import data_keys
-from .recordings import Recordings, as_stated, stated, with_braking
+from .recordings import Recordings, as_stated
 from .schemas import ValidationRequest
 from .settings import Limits
+from .simulator import Host
 from .store import Store
 from .worker import Attempt, WithFile
 
@@ -31,25 +32,29 @@ def validation(store: Store, recordings: Recordings) -> Kind:
     """The job kind, bound to where its recordings are kept."""
 
     def payload(job: Job) -> dict[str, Any]:
-        return {**job.spec, "recordings": _runs(job.spec, job.session, store, recordings)}
+        kept = [as_stated(store, job.session, run) for run in job.spec["runs"]]
+        return {**job.spec, "recordings": marked_runs(job.spec, kept, recordings)}
 
     return Kind(task=validate_runs, payload=payload)
 
 
 def check_and_fill(
+    host: Host,
     request: ValidationRequest,
-    session: str,
     fitted: Job,
-    store: Store,
-    recordings: Recordings,
+    of_fit: Sequence[Measurement],
+    held: Sequence[Measurement],
+    of_session: Sequence[Measurement],
     limits: Limits,
 ) -> dict[str, Any]:
-    """Everything that the job needs, checked."""
+    """In a simulator: everything that the job needs, checked.
+
+    of_fit, held, of_session : the recordings that were fitted, that are held out, and all
+    """
     from ..engine.validation.cases import check_cases
     from ..engine.validation.geometry import geometry_from_json
 
     fit = done(fitted)
-    held = [store.measurements.get(session, one) for one in request.hold_out]
     runs = [{**one, "role": "fit"} for one in fitted.spec["runs"]]
     runs += [{**stated(one), "role": "hold-out"} for one in held]
     for field in ("manoeuvres", "braking"):
@@ -59,7 +64,7 @@ def check_and_fill(
                 " out or add the run.",
                 field=field,
             )
-    kept = [*fitted_recordings(fitted, store), *held]
+    kept = [*of_fit, *held]
     spec = {
         "identification": fitted.id,
         "fit": fit,
@@ -71,8 +76,7 @@ def check_and_fill(
     if request.geometry is not None:
         geometry_from_json(request.geometry)
     check_budget(kept, fit["settings"]["step"], limits)
-    check_cases(_cases(spec, _runs(spec, session, store, recordings)))
-    of_session = store.measurements.of_session(session)
+    check_cases(_cases(spec, marked_runs(spec, kept, host.recordings)))
     data = data_keys(of_session)
     seen = {data[one.id] for one in kept}
     left_out = [
@@ -98,15 +102,6 @@ def _driven(request: ValidationRequest, kept: Sequence[Measurement]) -> dict[str
             found = known_manoeuvre(asked) if known else manoeuvre_from_json(asked)
             driven[one] = manoeuvre_to_json(found)
     return {one: manoeuvre for one, manoeuvre in driven.items() if manoeuvre is not None}
-
-
-def _runs(spec: Mapping[str, Any], session: str, store: Store, recordings: Recordings) -> list[Any]:
-    """The recordings with the noise, the braking and the conditioning that the job states."""
-    found = []
-    for one in spec["runs"]:
-        kept = as_stated(store, session, one)
-        found.append(with_braking(recordings.run(kept), spec["braking"].get(one["id"])))
-    return found
 
 
 def _cases(spec: Mapping[str, Any], runs: list[Any]) -> list[Any]:

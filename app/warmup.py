@@ -10,9 +10,11 @@ import threading
 from collections.abc import Callable
 from typing import Literal
 
-from .compile import PARTS, is_compiled, load_all, start_compilers
+from ..engine.kernel_cache import is_compiled
+from .compile import PARTS, start_compilers
 from .errors import Compiling
 from .samples import sample_project
+from .simulators import Simulators
 
 log = logging.getLogger(__name__)
 
@@ -82,10 +84,12 @@ class WarmUp:
         self._ended.set()
 
 
-def ready_to_simulate(warmup: WarmUp) -> None:
-    """The service's own warm-up: the sample project, then every kernel."""
+def ready_to_simulate(warmup: WarmUp, simulators: Simulators) -> None:
+    """The service's own warm-up: the sample project, while the kernels are loaded elsewhere, then
+    the simulators.
+    """
     sample_project()
     if not is_compiled():
         warmup.compile_apart()
     if not warmup.closed:
-        load_all()
+        simulators.start()

@@ -5,6 +5,7 @@ How a numerical method ended is not an error: a poor fit is a result.
 """
 
 import re
+from typing import Any
 
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]+")
 _LONG = re.compile(r"(\S{160})\S{40,}")
@@ -21,6 +22,17 @@ class RideError(Exception):
 
     def __init__(self, sentence: str = ""):
         super().__init__(_LONG.sub(r"\1...", _CONTROL.sub(" ", sentence)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Between processes it goes as it is: made anew it would want what made its sentence."""
+        return _as_it_was, (type(self), self.args, self.__dict__)
+
+
+def _as_it_was(kind: type[RideError], args: tuple[Any, ...], known: dict[str, Any]) -> RideError:
+    error = kind.__new__(kind)
+    error.args = args
+    error.__dict__.update(known)
+    return error
 
 
 class VehicleError(RideError):

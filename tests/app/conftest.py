@@ -35,7 +35,7 @@ def open_client(settings: Settings, *, login: bool = False, **options) -> TestCl
     """A client of a fresh service that takes the kernels as compiled, and lets everybody in unless
     there is to be a `login`; enter it to start.
     """
-    app = create_app(replace(settings, login=login), warm_up=lambda warmup: None)
+    app = create_app(replace(settings, login=login), warm_up=lambda *_: None)
     return TestClient(app, base_url=ADDRESS, **options)
 
 

@@ -13,7 +13,7 @@ import ridetune.app.backup
 from ridetune.app.cli import main
 from ridetune.app.data_directory import DataDirectory
 from ridetune.app.errors import NotFound
-from ridetune.app.measurement_store import NewMeasurement
+from ridetune.app.measurement import NewMeasurement
 from ridetune.app.settings import Limits
 from ridetune.app.setup_form import SetupForm
 from ridetune.app.store import Store

@@ -6,13 +6,15 @@ import time
 import zipfile
 
 import pytest
-from ridetune.app.campaign_job import drive_one, join_drives
+from ridetune.app.campaign_job import campaign, check_and_fill, drive_one, join_drives
+from ridetune.app.schemas import CampaignRequest
 from ridetune.app.settings import Limits, Settings
 from ridetune.app.worker import Attempt, CutShort
 from ridetune.engine.campaign import CAMPAIGN, Campaign, chosen, roughened
 from ridetune.engine.campaign_run import drive
 from ridetune.engine.detailed.car_file import reference_car
 from ridetune.engine.detailed.plant import DetailedPlant
+from ridetune.engine.errors import RideError
 from ridetune.engine.extras import how_to_install
 from ridetune.engine.manoeuvre import manoeuvre_from_json, manoeuvre_to_json, reference_manoeuvres
 from ridetune.engine.measurement import run_to_csv
@@ -304,6 +306,15 @@ def test_a_drive_that_diverges_is_kept_as_far_as_it_came(engineer):
     assert (refused.status_code, "no whole recording" in refused.text) == (409, True)
 
 
+def test_a_campaign_kept_from_before_it_told_its_drives_has_the_same():
+    """Oracle: what is told since."""
+    asked = CampaignRequest.model_validate({"manoeuvres": ["bump", "2"]})
+    spec, division = check_and_fill(None, asked, PAPER, Limits()), campaign().division
+    earlier = {name: spec[name] for name in spec if name not in ("drives", "slow")}
+    assert division.names(earlier) == division.names(spec) == ["manoeuvre_bump", "manoeuvre_2"]
+    assert division.slow(earlier) is division.slow(spec) is False
+
+
 def test_the_same_key_drives_once(tmp_path, monkeypatch):
     monkeypatch.setattr("ridetune.app.main.Cluster", StandIn)
     with open_client(Settings(data=tmp_path)) as client:
@@ -326,13 +337,15 @@ def test_the_plants_are_listed(client):
 
 
 def test_a_car_whose_solver_is_not_installed_is_listed_and_refused(visitor, monkeypatch):
+    """Refused by what a simulator calls, here, where the solver is hidden."""
     monkeypatch.setattr("ridetune.engine.detailed.exudyn_module.find_spec", lambda name: None)
     _, detailed = visitor.client.get("/api/plants").json()
     remedy = f"{how_to_install('detailed')}, and start a running service again."
     assert detailed["missing"].endswith(f"not installed; {remedy}")
-    refused = visitor.post("/campaigns", json={"plant": "detailed", "manoeuvres": ["bump"]})
-    assert (refused.status_code, refused.json()["detail"]) == (422, detailed["missing"])
-    assert visitor.get("/campaigns").json() == []
+    asked = CampaignRequest.model_validate({"plant": "detailed", "manoeuvres": ["bump"]})
+    with pytest.raises(RideError) as refused:
+        check_and_fill(None, asked, {}, Limits())
+    assert str(refused.value) == detailed["missing"]
 
 
 def test_the_detailed_car_tells_how_far_it_is_and_stops_in_the_midst_of_a_drive(engineer):

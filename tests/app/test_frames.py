@@ -88,7 +88,7 @@ def test_a_channel_the_run_lacks_is_left_out_and_an_unknown_one_refused(run):
 
 def test_numbers_that_json_lacks_become_null():
     run = Run("gap", np.array([0.0, 1.0]), {"chassis.z": np.array([np.nan, np.inf])})
-    reply = frames.to_json({"fit_percent": {"chassis.z": -np.inf}}, frames.take(run))
+    reply = json.loads(frames.to_json({"fit_percent": {"chassis.z": -np.inf}}, frames.take(run)))
     assert reply["values"]["chassis.z"] == [None, None]
     assert reply["fit_percent"] == {"chassis.z": None}
     _, values = read_binary(frames.to_binary({}, frames.take(run)))

@@ -3,7 +3,7 @@
 import pytest
 from ridetune.app.errors import Busy, NotFound
 from ridetune.app.job_store import LEASE
-from ridetune.app.measurement_store import NewMeasurement
+from ridetune.app.measurement import NewMeasurement
 from ridetune.app.settings import Limits
 from ridetune.app.store import Store
 

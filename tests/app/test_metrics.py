@@ -25,7 +25,7 @@ TABLE = Path(__file__).parents[2] / "docs" / "operations.md"
 
 def opened(settings: Settings, peer=HERE) -> TestClient:
     settings = replace(settings, login=bool(settings.token))
-    app = create_app(settings, warm_up=lambda warmup: None)
+    app = create_app(settings, warm_up=lambda *_: None)
     return TestClient(app, base_url=ADDRESS, client=peer)
 
 

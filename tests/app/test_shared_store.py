@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from ridetune.app.data_directory import DataDirectory
 from ridetune.app.errors import Busy, InvalidRequest, NotFound, StartError
-from ridetune.app.measurement_store import NewMeasurement
+from ridetune.app.measurement import NewMeasurement
 from ridetune.app.settings import Limits
 from ridetune.app.store import Store
 

@@ -11,7 +11,6 @@ from fastapi.testclient import TestClient
 from numpy.testing import assert_allclose
 from ridetune.app.main import create_app
 from ridetune.app.settings import Settings
-from ridetune.app.warmup import WarmUp
 from ridetune.engine.errors import SimulationError
 from ridetune.engine.manoeuvre import manoeuvre_from_json, reference_manoeuvres
 from ridetune.engine.measurement import read_run
@@ -286,7 +285,7 @@ def test_a_form_that_does_not_exist_is_not_acceptable(driver):
 def test_while_the_kernels_compile_simulations_wait_and_the_rest_works(settings):
     """503 with Retry-After, told by /readyz too; afterwards both answer."""
     compiled = threading.Event()
-    app = create_app(replace(settings, login=False), warm_up=lambda warmup: compiled.wait(20))
+    app = create_app(replace(settings, login=False), warm_up=lambda *_: compiled.wait(20))
     with TestClient(app, base_url=ADDRESS) as client:
         visitor = Visitor(client)
         waiting = visitor.post("/simulations", json={})
@@ -304,7 +303,7 @@ def test_while_the_kernels_compile_simulations_wait_and_the_rest_works(settings)
 
 
 def test_a_failed_compilation_is_told(settings):
-    def broken(warmup: WarmUp) -> None:
+    def broken(*_) -> None:
         raise RuntimeError("no compiler")
 
     with TestClient(create_app(settings, warm_up=broken), base_url=ADDRESS) as client:

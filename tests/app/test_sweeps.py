@@ -10,7 +10,7 @@ from numpy.testing import assert_array_equal
 from pyarrow import feather, parquet
 from ridetune.app.schemas import SweepRequest
 from ridetune.app.settings import Limits, Settings
-from ridetune.app.sweep_job import join_shares, most_bytes, sweep
+from ridetune.app.sweep_job import design_of, join_shares, most_bytes, sweep
 from ridetune.app.worker import Attempt
 from ridetune.engine.manoeuvre import reference_manoeuvres
 from ridetune.engine.simulation.excitation import FreeExcitation
@@ -106,7 +106,7 @@ def test_the_rows_come_in_every_form(engineer, done):
 def test_a_file_is_no_larger_than_was_held_against_the_session_s_room(engineer, done):
     """Of few cars it is hardly more than what it says of itself."""
     written = len(engineer.get(f"/sweeps/{done['id']}/cars.parquet").content)
-    assert written <= most_bytes(SweepRequest.model_validate({"design": BOX, **BUMP}))
+    assert written <= most_bytes(design_of(SweepRequest.model_validate({"design": BOX}).design))
 
 
 def test_what_a_sweep_shows_repeats_it(engineer, done):

@@ -4,9 +4,10 @@ import time
 
 import psutil
 import pytest
-from ridetune.app.compile import PARTS, is_compiled, load_all
+from ridetune.app.compile import PARTS, load_all
 from ridetune.app.errors import Compiling
 from ridetune.app.warmup import WarmUp
+from ridetune.engine.kernel_cache import is_compiled
 
 
 def test_work_waits_until_the_kernels_are_there():
@@ -21,7 +22,7 @@ def test_work_waits_until_the_kernels_are_there():
 
 
 def test_a_failure_is_told_and_logged(caplog):
-    def broken(warmup: WarmUp) -> None:
+    def broken(*_) -> None:
         raise RuntimeError("no compiler")
 
     warmup = WarmUp(broken)
