@@ -382,7 +382,7 @@ class Dispatcher:
     def _finish(self, active: ActiveJob, state: str, **found: Any) -> None:
         job = active.job.id
         if self._active.get(job) is active:
-            self._written(lambda: self._store.finish_job(job, state, **found))
+            self._written(lambda: self._store.finish_job(job, state, runner=self._runner, **found))
             self._let_go(active)
 
     def _let_go(self, active: ActiveJob) -> None:

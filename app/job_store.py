@@ -282,24 +282,27 @@ class JobStore:
         )
 
     def ask_to_cancel(self, session: str, job: str) -> Job:
-        """Have a job's runner stop it; one that has no runner and no parts is cancelled at once."""
+        """Have a job's runner stop it; one without parts that nobody runs, or that has not started,
+        is cancelled at once.
+        """
         with self._database.writing() as connection:
             mine = (jobs.c.session == session) & (jobs.c.id == job)
             connection.execute(
                 update(jobs).where(mine, jobs.c.state.in_(UNFINISHED)).values(cancel_asked=True)
             )
-            unowned = select(jobs.c.id).where(
-                mine, _to_cancel(), jobs.c.state.in_(UNFINISHED), jobs.c.runner.is_(None)
+            idle = (jobs.c.state == "queued") | jobs.c.runner.is_(None)
+            unbegun = select(jobs.c.id).where(
+                mine, _to_cancel(), jobs.c.state.in_(UNFINISHED), idle
             )
-            self._cancel(connection, connection.execute(unowned).scalars().all())
+            self._cancel(connection, connection.execute(unbegun).scalars().all())
         return self.get(session, job)
 
-    def hold_in(self, connection: Connection, job: str) -> bool:
-        """Hold a job's row to the end of a transaction, before its files; False where it has ended
-        or is gone.
+    def hold_in(self, connection: Connection, job: str) -> Row[Any] | None:
+        """Hold a job's row to the end of a transaction, before its files; whose it is, as `runner`.
+        None where it has ended or is gone.
         """
-        row = select(jobs.c.id).where(jobs.c.id == job, jobs.c.state.in_(UNFINISHED))
-        return connection.execute(row.with_for_update()).one_or_none() is not None
+        row = select(jobs.c.runner).where(jobs.c.id == job, jobs.c.state.in_(UNFINISHED))
+        return connection.execute(row.with_for_update()).one_or_none()
 
     def finish_in(
         self,

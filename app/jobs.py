@@ -143,11 +143,8 @@ class Jobs:
                 del self._followers[job]
 
     def _stop(self, job: Job) -> None:
-        if job.state == "queued" and not self._store.parts(job.id):
-            self._store.finish_job(job.id, "cancelled")
-            self._wake(job.id)
-        else:
-            self._store.jobs.ask_to_cancel(job.session, job.id)
+        self._store.jobs.ask_to_cancel(job.session, job.id)
+        self._wake(job.id)
         self._dispatcher.cancel(job.id)
 
     def _with_progress(self, job: Job) -> Job:

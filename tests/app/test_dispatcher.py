@@ -50,12 +50,13 @@ class Team:
         self.sessions: dict[str, str] = {}
         self.dispatchers: list[Dispatcher] = []
         self.taking = True
+        self.changed: list[str] = []
 
     def dispatch(self) -> StandIn:
         """The cluster of one more."""
         cluster = StandIn("", None)
         made = Dispatcher(
-            self.store, cluster, KINDS, lambda job: None, lambda: True, lambda: self.taking
+            self.store, cluster, KINDS, self.changed.append, lambda: True, lambda: self.taking
         )
         self.dispatchers.append(made)
         made.start()
@@ -224,7 +225,7 @@ def test_a_cancelled_sweep_ends_once_nothing_of_it_runs(team):
     make(cluster, job, "a")
     team.store.jobs.ask_to_cancel(team.ann, job)  # as another process would
     until(lambda: team.state(job) == "cancelled")
-    assert cluster.tasks == {}
+    until(lambda: cluster.tasks == {})
 
 
 def test_a_unit_that_fails_fails_its_job_alone(team):
@@ -249,6 +250,26 @@ def test_a_job_whose_lease_another_took_is_let_go(team):
         connection.execute(update(jobs).values(runner="another"))
     until(lambda: fit in cluster.cancelled)
     assert team.state(fit) == "queued"
+
+
+def test_the_end_of_a_job_that_another_took_is_not_its_end(team, monkeypatch):
+    """However late it is noticed: the leases' thread is away."""
+
+    def away(runner):
+        raise Unavailable("The database cannot be reached.")
+
+    monkeypatch.setattr(team.store.jobs, "heartbeat", away)
+    cluster = team.dispatch()
+    fits = {state: team.submit("fit", team.ann) for state in ("done", "failed")}
+    until(lambda: set(fits.values()) == set(cluster.tasks))
+    with team.store.database.writing() as connection:
+        connection.execute(update(jobs).values(runner="another"))
+    cluster.end(fits["done"], "done", result={"cost": 1.0})
+    cluster.end(fits["failed"], "failed", error={"code": "x", "detail": "y"})
+    until(lambda: set(fits.values()) <= set(team.changed))
+    for fit in fits.values():
+        assert team.state(fit) == "queued"
+        assert team.store.finish_job(fit, "done", runner="another")
 
 
 def test_nothing_that_was_told_is_lost_while_the_database_is_away(team, monkeypatch):

@@ -107,8 +107,7 @@ def test_a_runner_that_slept_keeps_what_nobody_took(store, session, later):
     assert claimed(store, "b") == []
 
 
-def test_only_its_runner_moves_a_job_but_the_first_end_is_the_end(store, session):
-    """Who has lost a job may still be the first that is done with it: the result is the same."""
+def test_only_its_runner_moves_and_ends_a_job_and_the_first_end_is_the_end(store, session):
     job = queued(store, session)
     claimed(store, "a")
     assert not store.jobs.start(job, "b")
@@ -121,8 +120,12 @@ def test_only_its_runner_moves_a_job_but_the_first_end_is_the_end(store, session
     assert store.jobs.requeue(job, "a")
     kept = store.jobs.get(session, job)
     assert (kept.state, kept.runner, kept.attempts, kept.restarts) == ("queued", "a", 1, 0)
-    assert store.finish_job(job, "done", result={"cost": 1.0})
-    assert not store.finish_job(job, "failed", error={"code": "x", "detail": "y"})
+    assert not store.finish_job(job, "done", runner="b", result={"cost": 2.0}, file=b"late")
+    assert not store.finish_job(job, "cancelled")
+    assert store.jobs.get(session, job) == kept
+    assert originals(store) == set()
+    assert store.finish_job(job, "done", runner="a", result={"cost": 1.0})
+    assert not store.finish_job(job, "failed", runner="a", error={"code": "x", "detail": "y"})
     assert store.jobs.heartbeat("a").jobs == frozenset()
 
 
@@ -153,8 +156,11 @@ def test_after_a_crash_everything_is_claimable_at_once_with_sqlite(tmp_path):
     store.close()
 
 
-def test_a_job_without_a_runner_is_cancelled_at_once(store, session):
+@pytest.mark.parametrize("state", ["without a runner", "not started"])
+def test_a_job_that_does_not_run_is_cancelled_at_once(store, session, state):
     job = queued(store, session)
+    if state == "not started":
+        claimed(store, "a")
     assert store.jobs.ask_to_cancel(session, job).state == "cancelled"
     assert claimed(store, "a") == []
     assert store.jobs.ask_to_cancel(session, job).state == "cancelled"
@@ -174,7 +180,8 @@ def test_a_job_with_parts_is_left_to_a_runner_to_be_cancelled(store, session):
 def test_a_runner_hears_with_its_heartbeat_what_is_to_stop(store, session):
     stopping, going_on = queued(store, session), queued(store, session)
     claimed(store, "a")
-    assert store.jobs.ask_to_cancel(session, stopping).state == "queued"
+    store.jobs.start(stopping, "a")
+    assert store.jobs.ask_to_cancel(session, stopping).state == "running"
     beat = store.jobs.heartbeat("a")
     assert (beat.jobs, beat.cancel_asked) == ({stopping, going_on}, {stopping})
 
@@ -183,6 +190,7 @@ def test_a_runner_hears_with_its_heartbeat_what_is_to_stop(store, session):
 def test_what_was_asked_to_stop_is_not_run_again(store, session, later, end):
     job = queued(store, session)
     claimed(store, "a")
+    store.jobs.start(job, "a")
     store.jobs.ask_to_cancel(session, job)
     if end == "released":
         store.jobs.release("a")

@@ -89,7 +89,7 @@ def test_every_job_is_claimed_exactly_once(stores):
             for job in store.jobs.claim(runner, 3):
                 assert store.jobs.start(job.id, runner)
                 assert job.id in store.jobs.heartbeat(runner).jobs
-                assert store.finish_job(job.id, "done", result={})
+                assert store.finish_job(job.id, "done", runner=runner, result={})
                 done.append(job.id)
         return done
 
@@ -180,7 +180,7 @@ def test_a_session_may_go_while_it_is_added_to(stores):
         works = [
             lambda: add(stores[0]),
             lambda: add(stores[1]),
-            lambda job=job: stores[1].finish_job(job, "done", result={}, file=b"made"),
+            lambda job=job: stores[1].finish_job(job, "done", runner="me", file=b"made"),
             lambda: stores[0].jobs.heartbeat("me"),
             lambda session=session: stores[1].sessions.delete(session),
         ]
@@ -236,7 +236,8 @@ def test_what_one_service_keeps_the_other_finds(services):
     job = queued(one, session)
     assert [found.id for found in one.jobs.claim("one", 1)] == [job]
     assert other.jobs.claim("other", 1) == []
-    assert other.jobs.ask_to_cancel(session, job).state == "queued"
+    assert one.jobs.start(job, "one")
+    assert other.jobs.ask_to_cancel(session, job).state == "running"
     assert one.jobs.heartbeat("one").cancel_asked == {job}
     other.delete_job(session, job)
     assert one.jobs.heartbeat("one").jobs == frozenset()

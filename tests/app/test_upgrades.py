@@ -77,7 +77,7 @@ def test_a_database_of_an_earlier_version_works_like_any_other(tmp_path, old):
     claimed = store.jobs.claim("me", 5)
     assert [(job.id, job.restarts) for job in claimed] == [("queued", 0), ("running", 1)]
     assert store.keep_part("running", "second", b"half the rows")
-    assert store.finish_job("running", "done", result={}, file=b"all the rows")
+    assert store.finish_job("running", "done", runner="me", file=b"all the rows")
     store.jobs.release("me")
     store.sessions.delete("s1")
     assert list(store.directory.names()) == []
