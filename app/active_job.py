@@ -19,7 +19,8 @@ class ActiveJob:
     gather_at : when its payload is to be gathered, s; infinite once that has begun
     payload : None until it is gathered
     slow : whether its units hold a worker for long
-    waiting : units that are not sent;  running : those that are
+    waiting : units that are not sent;  running : those that are, each with what stands for the
+        attempt
     kept : names of the parts
     progress : of the units
     lost : how often a unit went with its worker
@@ -31,7 +32,7 @@ class ActiveJob:
     payload: Any = None
     slow: bool = False
     waiting: deque[str] = field(default_factory=deque)
-    running: set[str] = field(default_factory=set)
+    running: dict[str, object] = field(default_factory=dict)
     kept: set[str] = field(default_factory=set)
     progress: dict[str, Progress] = field(default_factory=dict)
     lost: Counter[str] = field(default_factory=Counter)

@@ -30,6 +30,7 @@ from .cluster import Cluster
 from .errors import NotFound, Unavailable
 from .job_kinds import PROMPT, Kind, Progress
 from .job_store import Beat
+from .sent_unit import SentUnit
 from .store import Store
 from .worker import Ending
 
@@ -122,28 +123,6 @@ class Dispatcher:
         """How far a job under way here is."""
         return self._progress.get(job)
 
-    # What the cluster tells
-
-    def task_started(self, task: str) -> None:
-        """Mark the job as running."""
-        self._hear(task, lambda active, unit: self._started(active))
-
-    def task_progressed(self, task: str, progress: Progress) -> None:
-        """Remember how far it is."""
-        self._hear(task, lambda active, unit: self._tell(active, unit, progress))
-
-    def task_kept(self, task: str, part: str, data: bytes) -> None:
-        """Keep a part that a task made on its way."""
-        self._hear(task, lambda active, unit: self._keep(active, part, data, {}))
-
-    def task_ended(self, task: str, ending: Ending) -> None:
-        """Keep the part or the result."""
-        self._hear(task, lambda active, unit: self._ended(active, unit, ending))
-
-    def task_lost(self, task: str, *, with_worker: bool) -> None:
-        """Send it again, but not for ever where it may be the reason."""
-        self._hear(task, lambda active, unit: self._lost(active, unit, with_worker))
-
     # The dispatcher's thread
 
     def _work(self) -> None:
@@ -170,24 +149,27 @@ class Dispatcher:
                 log.exception("jobs wait")
                 self._closing.wait(RETRY_AFTER)
 
-    def _hear(self, task: str, then: Callable[[ActiveJob, str], None]) -> None:
-        """Put what a task tells into the queue; of a job that is no longer ours it is nothing."""
-        job, _, unit = task.partition("/")
+    def hear(self, sent: SentUnit, then: Callable[[], None]) -> None:
+        """Put what is told of a unit into the queue."""
+        active = sent.active
 
         def heard() -> None:
-            active = self._active.get(job)
-            if active is None:
+            if active.running.get(sent.unit) is not sent or not self._has(active):
                 return
             try:
-                then(active, unit)
+                then()
             except Closing:
                 raise
             except Exception:
-                log.exception("cannot keep what became of job %s", job)
+                log.exception("cannot keep what became of job %s", active.job.id)
                 self._fail(active, "internal", "The job failed; see the service's log.")
-            self._changed(job)
+            self._changed(active.job.id)
 
         self._news.put(heard)
+
+    def _has(self, active: ActiveJob) -> bool:
+        """Whether a job is still this process's as it was claimed."""
+        return self._active.get(active.job.id) is active
 
     def _look(self) -> None:
         self._looked = 0.0
@@ -250,7 +232,7 @@ class Dispatcher:
         active.gather_at = time.monotonic() + RETRY_AFTER
 
     def _gathered(self, active: ActiveJob, payload: Any, units: Sequence[str], slow: bool) -> None:
-        if self._active.get(active.job.id) is not active:
+        if not self._has(active):
             return
         for name, progress in self._written(lambda: self._store.parts(active.job.id)).items():
             if name.startswith(_KEPT_BY):
@@ -292,17 +274,24 @@ class Dispatcher:
             # lost, and it is claimed again with the others.
             self._let_go(active)
             return
+        sent = SentUnit(active, unit, self)
         self._cluster.submit(
-            _task(job.id, unit), task, payload, self, kept=kept, priority=job.priority
+            _task(job.id, unit), task, payload, sent, kept=kept, priority=job.priority
         )
         if unit != LAST:
             active.waiting.popleft()
-        active.running.add(unit)
+        active.running[unit] = sent
 
-    def _started(self, active: ActiveJob) -> None:
+    def started(self, sent: SentUnit) -> None:
+        """Mark the job as running."""
+        active = sent.active
         if not active.started:
             active.started = True
             self._written(lambda: self._store.jobs.start(active.job.id, self._runner))
+
+    def told(self, sent: SentUnit, progress: Progress) -> None:
+        """Remember how far the unit is."""
+        self._tell(sent.active, sent.unit, progress)
 
     def _tell(self, active: ActiveJob, unit: str, progress: Progress) -> None:
         active.progress[unit] = progress
@@ -313,13 +302,19 @@ class Dispatcher:
             progress = division.progress(active.job.spec, active.progress, len(active.running))
         self._progress[active.job.id] = progress
 
+    def kept(self, sent: SentUnit, part: str, data: bytes) -> None:
+        """Keep a part that a task made on its way."""
+        self._keep(sent.active, part, data, {})
+
     def _keep(self, active: ActiveJob, part: str, data: bytes, progress: Progress) -> None:
         name = _KEPT_BY + part
         if self._written(lambda: self._store.keep_part(active.job.id, name, data, progress)):
             active.kept.add(part)
 
-    def _ended(self, active: ActiveJob, unit: str, ending: Ending) -> None:
-        active.running.discard(unit)
+    def ended(self, sent: SentUnit, ending: Ending) -> None:
+        """Keep the part or the result."""
+        active, unit = sent.active, sent.unit
+        del active.running[unit]
         if ending["state"] == "cancelled" and not active.cancelled:
             # Nobody asked it to stop, as long as the job is ours.
             if unit != LAST:
@@ -341,8 +336,10 @@ class Dispatcher:
             self._tell(active, unit, progress)
         self._conclude(active)
 
-    def _lost(self, active: ActiveJob, unit: str, with_worker: bool) -> None:
-        active.running.discard(unit)
+    def lost(self, sent: SentUnit, *, with_worker: bool) -> None:
+        """Send the unit again, but not for ever where it may be the reason."""
+        active, unit = sent.active, sent.unit
+        del active.running[unit]
         if active.cancelled:
             self._conclude(active)
             return
@@ -381,7 +378,7 @@ class Dispatcher:
 
     def _finish(self, active: ActiveJob, state: str, **found: Any) -> None:
         job = active.job.id
-        if self._active.get(job) is active:
+        if self._has(active):
             self._written(lambda: self._store.finish_job(job, state, runner=self._runner, **found))
             self._let_go(active)
 

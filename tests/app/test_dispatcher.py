@@ -272,6 +272,45 @@ def test_the_end_of_a_job_that_another_took_is_not_its_end(team, monkeypatch):
         assert team.store.finish_job(fit, "done", runner="another")
 
 
+def test_what_an_earlier_attempt_of_a_unit_tells_is_not_of_the_next(team):
+    """As where a lease was lost and taken again: the old task is still being stopped."""
+    cluster = team.dispatch()
+    fit = team.submit("fit", team.ann)
+    until(lambda: fit in cluster.tasks)
+    earlier = cluster.tasks[fit][2]
+    cluster.lose(fit, with_worker=False)
+    until(lambda: fit in cluster.tasks)
+    error = {"code": "worker-lost", "detail": "It is gone."}
+    ending = {"state": "failed", "result": None, "error": error, "progress": {}}
+    earlier.task_ended(fit, ending)
+    cluster.end(fit, "done", result={"cost": 1.0})
+    until(lambda: team.store.jobs.get(team.ann, fit).ended)
+    assert team.state(fit) == "done"
+
+
+def test_of_progress_told_while_the_database_is_away_only_the_latest_waits(team, monkeypatch):
+    """So that the memory it takes is bounded however long that lasts."""
+    cluster = team.dispatch()
+    ended, fit = team.submit("fit", team.bob), team.submit("fit", team.ann)
+    until(lambda: {ended, fit} == set(cluster.tasks))
+    finish, asked, back = team.store.finish_job, Event(), Event()
+
+    def away(*told, **found):
+        asked.set()
+        if not back.is_set():
+            raise Unavailable("The database cannot be reached.")
+        return finish(*told, **found)
+
+    monkeypatch.setattr(team.store, "finish_job", away)
+    cluster.end(ended, "done", result={})
+    asked.wait(10)
+    for cost in range(1000):
+        cluster.report(fit, cost=cost)
+    back.set()
+    until(lambda: team.dispatchers[0].progress(fit) == {"cost": 999})
+    assert team.changed.count(fit) == 1
+
+
 def test_nothing_that_was_told_is_lost_while_the_database_is_away(team, monkeypatch):
     cluster = team.dispatch()
     fit = team.submit("fit", team.ann)
