@@ -206,6 +206,11 @@ def _readable(name: str) -> Iterator[None]:
         ) from None
     except FileNotFoundError:
         raise NotFound(f"{name} has been deleted meanwhile; choose another measurement.") from None
+    except MeasurementError as error:
+        # The process that was to read it could not be started.
+        if isinstance(error.__cause__, OSError) and (trouble := trouble_of(error.__cause__)):
+            raise trouble from error
+        raise
     except OSError as error:
         raise trouble_of(error) or MeasurementError(
             f"{name}: the file cannot be read just now ({error.strerror}); try again later."

@@ -1,5 +1,6 @@
 """Which job runs when, what is kept of it, and who goes on with it; the cluster is a stand-in."""
 
+import errno
 from dataclasses import replace
 from threading import Event
 
@@ -387,6 +388,25 @@ def test_a_job_of_which_nobody_knows_how_slow_it_is_fails_alone(team, monkeypatc
     bad, good = team.submit("campaign", team.ann, "ab"), team.submit("sweep", team.ann, "ab")
     until(lambda: team.state(bad) == "failed")
     until(lambda: f"{good}/a" in cluster.tasks)
+
+
+@pytest.mark.parametrize("number", [errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ENOSPC])
+def test_a_part_waits_for_what_there_is_too_little_of(team, monkeypatch, number):
+    """Files, memory, or room on the disk; the part is kept once there is enough again."""
+    cluster = team.dispatch()
+    job = team.submit("sweep", team.ann, "a")
+    keep, refused = team.store.directory.keep, []
+
+    def short(*told):
+        refused.append(told)
+        if len(refused) < 3:
+            raise OSError(number, "injected")
+        keep(*told)
+
+    monkeypatch.setattr(team.store.directory, "keep", short)
+    make(cluster, job, "a")
+    until(lambda: job in cluster.tasks or team.store.jobs.get(team.ann, job).ended)
+    assert cluster.kept.get(job) == {"a": b"a"}
 
 
 def test_a_part_that_the_disk_lost_is_made_again(team):

@@ -115,11 +115,14 @@ DISKS = {
     "over quota": (errno.EDQUOT, 507, "disk of the service is full"),
     "read-only": (errno.EROFS, 503, "data directory cannot be used"),
     "broken": (errno.EIO, 503, "data directory cannot be used"),
+    "out of files": (errno.EMFILE, 503, "too many files open"),
+    "out of memory": (errno.ENOMEM, 503, "too little memory"),
 }
 PLACES = {
     "flushing": "ridetune.app.data_directory.os.fsync",
     "renaming": "ridetune.app.data_directory.os.replace",
     "reading": "ridetune.app.recordings.NamedTemporaryFile",
+    "starting a reader": "ridetune.engine.formats.child.subprocess.Popen",
     "receiving": "ridetune.app.uploads.SpooledTemporaryFile",
 }
 
@@ -201,13 +204,14 @@ def test_who_was_let_in_stays_so_while_the_database_takes_nothing(settings):
         assert service.get("/api/parameters").status_code == 200
 
 
-def test_a_job_s_files_wait_for_room(tmp_path, database, monkeypatch):
+@pytest.mark.parametrize("disk", DISKS)
+def test_a_job_s_files_wait_for_room(tmp_path, database, monkeypatch, disk):
     """Oracle: the job is as it was, and can be ended once there is room."""
     store = Store(tmp_path, Limits(), database)
     session, _ = store.sessions.create({}, [])
     job, _ = store.jobs.add(session, "test", {"runs": [], "asked": "a fit"}, None)
     with monkeypatch.context() as patch:
-        patch.setattr(PLACES["flushing"], raising(errno.ENOSPC))
+        patch.setattr(PLACES["flushing"], raising(DISKS[disk][0]))
         for keep in (
             lambda: store.keep_part(job.id, "part", b"rows"),
             lambda: store.finish_job(job.id, "done", file=b"rows"),
