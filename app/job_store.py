@@ -172,6 +172,14 @@ class JobStore:
             query = _select(jobs.c.session == session, jobs.c.kind == kind).order_by(jobs.c.created)
             return [_job(row) for row in connection.execute(query)]
 
+    def standing(self, some: Collection[str]) -> dict[str, Job]:
+        """Those of some jobs that there are, by id, without results; of whichever session, which
+        the caller has to look at.
+        """
+        with self._database.reading() as connection:
+            rows = connection.execute(_select(jobs.c.id.in_(some)))
+            return {row.id: _job(row) for row in rows}
+
     def unfinished(self, session: str | None = None) -> list[Job]:
         """Jobs that are queued or running, oldest first."""
         with self._database.reading() as connection:
