@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from .job_kinds import Kind, Progress
-from .job_store import Job
+from .job_row import Job
 
 LAST = ""
 """The unit that makes the result of all others."""

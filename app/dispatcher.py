@@ -29,7 +29,7 @@ from .active_job import LAST, ActiveJob, chosen
 from .cluster import Cluster
 from .errors import NotFound, Unavailable
 from .job_kinds import PROMPT, Kind, Progress
-from .job_store import Beat
+from .job_leases import Beat
 from .sent_unit import SentUnit
 from .store import Store
 from .worker import Ending
@@ -109,7 +109,7 @@ class Dispatcher:
             if thread.is_alive():
                 thread.join()
         with suppress(Unavailable):
-            self._store.jobs.release(self._runner)
+            self._store.leases.release(self._runner)
 
     def look(self) -> None:
         """There may be a job to claim."""
@@ -191,7 +191,7 @@ class Dispatcher:
         if (room := most - len(self._active)) <= 0:
             return
         known = tuple(self._active)
-        for job in self._store.jobs.claim(
+        for job in self._store.leases.claim(
             self._runner, room, kinds=self._kinds.keys(), known=known, **of
         ):
             active = self._active[job.id] = ActiveJob(job, self._kinds[job.kind])
@@ -287,7 +287,7 @@ class Dispatcher:
         active = sent.active
         if not active.started:
             active.started = True
-            self._written(lambda: self._store.jobs.start(active.job.id, self._runner))
+            self._written(lambda: self._store.leases.start(active.job.id, self._runner))
 
     def told(self, sent: SentUnit, progress: Progress) -> None:
         """Remember how far the unit is."""
@@ -351,7 +351,7 @@ class Dispatcher:
                 detail = "The job's workers were lost each time it was tried."
                 self._fail(active, "worker-lost", detail)
                 return
-            self._written(lambda: self._store.jobs.requeue(active.job.id, self._runner))
+            self._written(lambda: self._store.leases.requeue(active.job.id, self._runner))
             active.started = False
 
     def _cancel(self, job: str) -> None:
@@ -404,7 +404,7 @@ class Dispatcher:
         self._recorded = now
         for job, progress in self._progress.items():
             if self._saved.get(job) is not progress:
-                self._store.jobs.save_progress(job, self._runner, progress)
+                self._store.leases.save_progress(job, self._runner, progress)
                 self._saved[job] = progress
 
     def _written(self, write: Callable[[], Any]) -> Any:
@@ -424,7 +424,7 @@ class Dispatcher:
             if not (known := frozenset(self._active)):
                 continue
             try:
-                beat = self._store.jobs.heartbeat(self._runner)
+                beat = self._store.leases.heartbeat(self._runner)
             except Exception as error:
                 log.warning("leases of jobs are not renewed: %s", error)
                 continue

@@ -11,7 +11,8 @@ from collections.abc import AsyncGenerator, Collection, Mapping
 from contextlib import suppress
 
 from .errors import Unavailable
-from .job_store import Job, JobStore
+from .job_row import Job
+from .job_store import JobStore
 
 log = logging.getLogger(__name__)
 

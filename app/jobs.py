@@ -17,7 +17,7 @@ from .dispatcher import Dispatcher
 from .errors import Busy, NotFound, Unavailable
 from .followers import Followers
 from .job_kinds import Kind
-from .job_store import Job
+from .job_row import Job
 from .store import Store
 
 

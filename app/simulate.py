@@ -22,7 +22,7 @@ from ..engine.vehicle_file import vehicle_from_json
 from .errors import OverBudget
 from .excitation import excitation_of, extent, mode_of, recording_in, recording_of
 from .identification_job import done
-from .job_store import Job
+from .job_row import Job
 from .recordings import Recordings
 from .schemas import SimulationRequest
 from .settings import Limits

@@ -16,6 +16,7 @@ from .data_directory import DataDirectory, database_of
 from .database import Database
 from .errors import NotFound
 from .file_store import FileStore
+from .job_leases import JobLeases
 from .job_store import JobStore
 from .key_store import KeyStore
 from .mapping_store import MappingStore
@@ -44,6 +45,7 @@ class Store:
         self.database, self.directory = _open_shared(path, database) if database else _open(path)
         self.files = FileStore(self.database, self.directory, limits)
         self.jobs = JobStore(self.database, limits)
+        self.leases = JobLeases(self.database)
         self.setups = SetupStore(self.database, limits)
         self.mappings = MappingStore(self.database, self.files)
         self.measurements = MeasurementStore(
@@ -58,7 +60,7 @@ class Store:
         else:
             # The lock of the directory tells that whoever was at them is gone.
             self.directory.sweep()
-            self.jobs.take_back_all()
+            self.leases.take_back_all()
         self.files.sweep()
 
     def close(self) -> None:

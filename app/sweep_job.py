@@ -12,7 +12,7 @@ from typing import Any
 
 from .errors import OverBudget
 from .job_kinds import PATIENT, Division, Kind, Progress, digest
-from .job_store import Job
+from .job_row import Job
 from .measurement_store import Measurement
 from .recordings import Recordings, as_stated, stated
 from .schemas import FullFactorialForm, SweepRequest

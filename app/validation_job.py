@@ -12,7 +12,7 @@ from ..engine.vehicle_file import vehicle_from_json
 from .errors import InvalidRequest
 from .identification_job import check_budget, done, fitted_recordings
 from .job_kinds import Kind
-from .job_store import Job
+from .job_row import Job
 from .measurement_store import Measurement
 from .measurement_view import data_keys
 from .recordings import Recordings, as_stated, stated, with_braking

@@ -259,7 +259,7 @@ def test_the_end_of_a_job_that_another_took_is_not_its_end(team, monkeypatch):
     def away(runner):
         raise Unavailable("The database cannot be reached.")
 
-    monkeypatch.setattr(team.store.jobs, "heartbeat", away)
+    monkeypatch.setattr(team.store.leases, "heartbeat", away)
     cluster = team.dispatch()
     fits = {state: team.submit("fit", team.ann) for state in ("done", "failed")}
     until(lambda: set(fits.values()) == set(cluster.tasks))
@@ -333,7 +333,7 @@ def test_nothing_that_was_told_is_lost_while_the_database_is_away(team, monkeypa
 
 def test_a_claim_whose_answer_was_lost_is_not_a_job_lost(team, monkeypatch):
     """The database has committed it, but the connection broke before it could tell."""
-    claim, broken = team.store.jobs.claim, []
+    claim, broken = team.store.leases.claim, []
 
     def claimed_unheard(*asked, **more):
         found = claim(*asked, **more)
@@ -342,7 +342,7 @@ def test_a_claim_whose_answer_was_lost_is_not_a_job_lost(team, monkeypatch):
             raise Unavailable("The database went away.")
         return found
 
-    monkeypatch.setattr(team.store.jobs, "claim", claimed_unheard)
+    monkeypatch.setattr(team.store.leases, "claim", claimed_unheard)
     fit = team.submit("fit", team.ann)
     cluster = team.dispatch()
     until(lambda: fit in cluster.tasks)

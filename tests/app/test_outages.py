@@ -57,8 +57,8 @@ def test_a_service_outlives_its_database(tmp_path, postgresql, on_postgresql):
                 refused(reply, 503, "database cannot be reached")
             # What threads of their own have to be ready for.
             for write in (
-                lambda: store.jobs.claim("me", 1),
-                lambda: store.jobs.heartbeat("me"),
+                lambda: store.leases.claim("me", 1),
+                lambda: store.leases.heartbeat("me"),
                 lambda: store.finish_job("any", "done", file=b"rows"),
                 lambda: store.keep_part("any", "part", b"rows"),
             ):
