@@ -52,6 +52,11 @@ class ActiveJob:
         return self.waiting[0] if self.waiting else LAST
 
 
+def task_of(job: str, unit: str) -> str:
+    """What the cluster calls a unit of a job."""
+    return f"{job}/{unit}" if unit else job
+
+
 def chosen(jobs: Collection[ActiveJob], width: int) -> ActiveJob | None:
     """The job whose unit is sent next, if there is one, and room: as many run as `width` says."""
     running = [one for one in jobs for _ in one.running]

@@ -5,7 +5,7 @@ from dataclasses import replace
 from threading import Event
 
 import pytest
-from ridetune.app import dispatcher as module
+from ridetune.app import dispatcher, gatherer, jobs_under_way, lease_keeper
 from ridetune.app.dispatcher import Dispatcher
 from ridetune.app.errors import Unavailable
 from ridetune.app.job_kinds import PATIENT, Division, Kind
@@ -78,8 +78,12 @@ class Team:
 
 @pytest.fixture
 def team(tmp_path, database, monkeypatch):
-    monkeypatch.setattr(module, "LOOK_EVERY", 0.02)
-    monkeypatch.setattr(module, "RETRY_AFTER", 0.02)
+    monkeypatch.setattr(dispatcher, "LOOK_EVERY", 0.02)
+    monkeypatch.setattr(dispatcher, "RETRY_AFTER", 0.02)
+    monkeypatch.setattr(gatherer, "GATHER_AGAIN_AFTER", 0.02)
+    monkeypatch.setattr(jobs_under_way, "RECORD_EVERY", 0.02)
+    monkeypatch.setattr(jobs_under_way, "REWRITE_AFTER", 0.02)
+    monkeypatch.setattr(lease_keeper, "BEAT_EVERY", 0.02)
     team = Team(tmp_path, database)
     yield team
     for one in team.dispatchers:
@@ -523,7 +527,7 @@ def test_units_that_are_lost_now_and_then_do_not_fail_their_job(team):
         until(lambda: f"{job}/{unit}" in cluster.tasks)
         cluster.lose(f"{job}/{unit}", with_worker=True)
         make(cluster, job, unit)
-    for _ in range(module.MOST_ATTEMPTS):
+    for _ in range(jobs_under_way.MOST_ATTEMPTS):
         assert team.state(job) != "failed"
         until(lambda: f"{job}/d" in cluster.tasks)
         cluster.lose(f"{job}/d", with_worker=True)
