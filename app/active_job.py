@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from .job_kinds import Kind, Progress
-from .job_store import Job
+from .job_row import Job
 
 LAST = ""
 """The unit that makes the result of all others."""
@@ -19,7 +19,8 @@ class ActiveJob:
     gather_at : when its payload is to be gathered, s; infinite once that has begun
     payload : None until it is gathered
     slow : whether its units hold a worker for long
-    waiting : units that are not sent;  running : those that are
+    waiting : units that are not sent;  running : those that are, each with what stands for the
+        attempt
     kept : names of the parts
     progress : of the units
     lost : how often a unit went with its worker
@@ -31,7 +32,7 @@ class ActiveJob:
     payload: Any = None
     slow: bool = False
     waiting: deque[str] = field(default_factory=deque)
-    running: set[str] = field(default_factory=set)
+    running: dict[str, object] = field(default_factory=dict)
     kept: set[str] = field(default_factory=set)
     progress: dict[str, Progress] = field(default_factory=dict)
     lost: Counter[str] = field(default_factory=Counter)
@@ -49,6 +50,11 @@ class ActiveJob:
         if self.payload is None or self.running and not self.waiting:
             return None
         return self.waiting[0] if self.waiting else LAST
+
+
+def task_of(job: str, unit: str) -> str:
+    """What the cluster calls a unit of a job."""
+    return f"{job}/{unit}" if unit else job
 
 
 def chosen(jobs: Collection[ActiveJob], width: int) -> ActiveJob | None:

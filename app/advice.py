@@ -15,7 +15,7 @@ from ..engine.vehicle_file import vehicle_from_json
 from .errors import InvalidRequest, OverBudget
 from .excitation import known_manoeuvre
 from .identification_job import UNTOLD, build_problem, done, marked_runs
-from .job_store import Job
+from .job_row import Job
 from .measurement import Measurement
 from .schemas import AdviceRequest
 from .settings import Limits

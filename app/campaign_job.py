@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from .campaign_archive import CampaignArchive, archive_of
 from .errors import InvalidRequest, OverBudget
 from .job_kinds import PATIENT, Division, Kind, Progress
-from .job_store import Job
+from .job_row import Job
 from .plants import Known, known_plant
 from .schemas import CampaignRequest
 from .settings import Limits

@@ -7,6 +7,7 @@ behind TLS, because whoever reaches a scheduler runs code as its user.
 Dask forgets everything with its scheduler; what must last is the caller's business.
 """
 
+import asyncio
 import logging
 import os
 import secrets
@@ -15,6 +16,7 @@ import time
 import warnings
 from collections import Counter
 from collections.abc import Mapping
+from concurrent.futures import Future, wait
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -29,7 +31,7 @@ LOOK_EVERY = 2.0
 """Time between two looks at a scheduler elsewhere, s; it has as long to connect."""
 
 ANSWER = 5.0
-"""Time that a scheduler has for an answer, s."""
+"""Time that a scheduler, or what it asks its workers, has for an answer, s."""
 
 CONFIGURATION = {
     # The default of 15 s drops a nanny for good whose worker is lost twice in that time.
@@ -158,14 +160,14 @@ class Cluster:
         future.add_done_callback(lambda done: self._ended(name, done))
 
     def cancel(self, name: str, grace: float) -> None:
-        """Ask a task to stop; after `grace` seconds kill its worker."""
+        """Ask a task to stop, and return at once; after `grace` seconds kill its worker."""
         with self._lock:
             task = self._tasks.get(name)
             if task is None or task.cancelled:
                 return
             task.cancelled = True
             client = self._client
-        _run(client, worker.ask_to_stop, task.key)
+        _tell_workers(client, worker.ask_to_stop, task.key)
         if task.address:
             timer = threading.Timer(grace, self._kill, (name,))
             timer.daemon = True
@@ -179,7 +181,8 @@ class Cluster:
             self._closed = True
             if self._client is not None and self._tasks:
                 # A worker that still computes would hold up the end for seconds.
-                _run(self._client, worker.ask_to_stop, *(task.key for task in self._tasks.values()))
+                keys = [task.key for task in self._tasks.values()]
+                wait([_tell_workers(self._client, worker.ask_to_stop, *keys)], ANSWER)
             self._stop()
 
     def _started(self) -> Any:
@@ -317,15 +320,22 @@ class Cluster:
                 return
             client = self._client
         task.future.cancel()
-        _run(client, worker.kill, task.process, workers=[task.address], nanny=True)
+        _tell_workers(client, worker.kill, task.process, workers=[task.address], nanny=True)
 
 
-def _run(client: Any, function: Any, *values: Any, **where: Any) -> None:
-    """Call a function on the workers; where they are gone there is nothing to call it for."""
-    try:
-        client.run(function, *values, on_error="ignore", **where)
-    except (OSError, RuntimeError) as error:
-        log.warning("cannot reach the job workers: %s", error)
+def _tell_workers(client: Any, function: Any, *values: Any, **where: Any) -> Future[None]:
+    """Call a function on the workers, without waiting for those that are gone or frozen; done once
+    all have called it, or `ANSWER` has passed.
+    """
+
+    async def told() -> None:
+        try:
+            async with asyncio.timeout(ANSWER):
+                await client.run(function, *values, on_error="ignore", **where)
+        except (OSError, RuntimeError, LookupError) as error:
+            log.warning("job workers do not answer: %r", error)
+
+    return asyncio.run_coroutine_threadsafe(told(), client.loop.asyncio_loop)
 
 
 def _security(certificates: Certificates | None) -> Any:

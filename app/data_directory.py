@@ -119,9 +119,8 @@ class DataDirectory:
         return place_of_original(self.path, sha256)
 
     def lacks(self, sha256: str) -> bool:
-        """Whether an original is not there, although its folder is."""
-        place = self.original(sha256)
-        return not place.exists() and place.parent.is_dir()
+        """Whether an original is not there, although others are; OSError where nobody can tell."""
+        return not self.original(sha256).exists() and any(self.originals.iterdir())
 
     def keep(self, sha256: str, data: bytes) -> None:
         """Write an original so that it survives a power cut, unless it is there."""

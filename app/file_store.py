@@ -57,6 +57,12 @@ class FileStore:
             raise Unavailable(OUT_OF_ORDER, retry_after=30)
         return place
 
+    def has_row(self, sha256: str) -> bool:
+        """Whether a file is kept, as far as the database knows."""
+        with self._database.reading() as connection:
+            row = select(uploads.c.sha256).where(uploads.c.sha256 == sha256)
+            return connection.execute(row).one_or_none() is not None
+
     def require_room(self, session: str, more: int) -> None:
         """Raise Busy where a session cannot keep so many bytes more."""
         with self._database.reading() as connection:

@@ -12,7 +12,7 @@ from ..engine.parameters import ALL_NAMES, PARAMETER_NAMES, parameter
 from ..engine.run import Run
 from .errors import Conflict, OverBudget
 from .job_kinds import Kind, digest
-from .job_store import Job
+from .job_row import Job
 from .measurement import Measurement
 from .recordings import Recordings, as_stated
 from .runs import Runs, with_braking

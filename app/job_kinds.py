@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from .job_store import Job
+from .job_row import Job
 from .schemas import WireForm
 from .worker import Task
 

@@ -12,7 +12,7 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from .access import SessionId, session_of
 from .errors import NotFound
 from .frames import clean
-from .job_store import Job
+from .job_row import Job
 from .services import Services, Shared
 from .strict_json import StrictRoute
 

@@ -1,92 +1,18 @@
-"""Jobs as kept in the database: queued, running, done, failed or cancelled.
-
-An unfinished job is run by its runner, one service process, which renews its lease by a heartbeat;
-once the lease has run out another one may claim it. A job may thus be run twice, and the first end
-is the end.
-
-`attempts` counts starts that ended in a lost worker. `restarts` counts those that ended because the
-runner was lost: it crashed, or its lease ran out. What one hands over as it stops in good order
-counts as neither: a job must not fail for our restarts.
-"""
+"""Jobs as their sessions keep them: asked for, looked at, asked to stop, ended."""
 
 import json
 import secrets
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
 from typing import Any
 
-from sqlalchemy import (
-    ColumnElement,
-    Connection,
-    Row,
-    ScalarSelect,
-    Select,
-    case,
-    delete,
-    exists,
-    func,
-    insert,
-    or_,
-    select,
-    update,
-)
+from sqlalchemy import Connection, Row, delete, func, insert, select, update
 
 from .database import Database
 from .errors import Busy, InvalidRequest, NotFound
+from .job_row import UNFINISHED, Job, cancel_in, job_of, select_jobs, to_cancel
 from .session_row import lock_session, mark_used
 from .settings import Limits
 from .tables import job_files, job_parts, jobs, results
-
-UNFINISHED = ("queued", "running")
-LEASE = 10.0
-"""How long a job stays its runner's after the last heartbeat, s."""
-
-
-@dataclass(frozen=True)
-class Job:
-    """One background job.
-
-    spec : everything needed to run it again
-    runner : the service process that runs it
-    priority : a job with a higher one is claimed before others
-    file : SHA-256 of what it made
-    """
-
-    id: str
-    session: str
-    kind: str
-    state: str
-    spec: dict[str, Any]
-    progress: dict[str, Any]
-    error: dict[str, str] | None
-    created: float
-    started: float | None
-    finished: float | None
-    attempts: int
-    restarts: int
-    runner: str | None
-    cancel_asked: bool
-    priority: int
-    result: dict[str, Any] | None = None
-    file: str | None = None
-
-    @property
-    def ended(self) -> bool:
-        """Whether the state is final."""
-        return self.state not in UNFINISHED
-
-    @property
-    def measurements(self) -> list[str]:
-        """Ids of the measurements it reads."""
-        return [run["id"] for run in self.spec.get("runs", [])]
-
-
-@dataclass(frozen=True)
-class Beat:
-    """The ids of a runner's unfinished jobs, and of those among them that are to stop."""
-
-    jobs: frozenset[str]
-    cancel_asked: frozenset[str]
 
 
 class JobStore:
@@ -142,7 +68,7 @@ class JobStore:
                 )
             )
             mark_used(connection, session)
-            return _job(connection.execute(_select(jobs.c.id == job)).one()), True
+            return job_of(connection.execute(select_jobs(jobs.c.id == job)).one()), True
 
     def known(self, session: str, key: str | None, asked: str) -> Job | None:
         """The job kept under the caller's key, if there is one.
@@ -156,7 +82,7 @@ class JobStore:
         """One job of a session, of one kind if it is told, with its result."""
         with self._database.reading() as connection:
             row = connection.execute(
-                _select(jobs.c.session == session, jobs.c.id == job)
+                select_jobs(jobs.c.session == session, jobs.c.id == job)
             ).one_or_none()
             body, file = (
                 connection.execute(select(column).where(table.c.job == job)).scalar_one_or_none()
@@ -164,13 +90,23 @@ class JobStore:
             )
         if row is None or kind not in (None, row.kind):
             raise NotFound(f"There is no {kind or 'job'} with that id in this session.")
-        return _job(row, body, file)
+        return job_of(row, body, file)
 
     def of_session(self, session: str, kind: str) -> list[Job]:
         """All jobs of a session and kind, oldest first, without results."""
         with self._database.reading() as connection:
-            query = _select(jobs.c.session == session, jobs.c.kind == kind).order_by(jobs.c.created)
-            return [_job(row) for row in connection.execute(query)]
+            query = select_jobs(jobs.c.session == session, jobs.c.kind == kind).order_by(
+                jobs.c.created
+            )
+            return [job_of(row) for row in connection.execute(query)]
+
+    def standing(self, some: Collection[str]) -> dict[str, Job]:
+        """Those of some jobs that there are, by id, without results; of whichever session, which
+        the caller has to look at.
+        """
+        with self._database.reading() as connection:
+            rows = connection.execute(select_jobs(jobs.c.id.in_(some)))
+            return {row.id: job_of(row) for row in rows}
 
     def unfinished(self, session: str | None = None) -> list[Job]:
         """Jobs that are queued or running, oldest first."""
@@ -182,124 +118,29 @@ class JobStore:
         conditions: list[Any] = [jobs.c.state.in_(UNFINISHED)]
         if session is not None:
             conditions.append(jobs.c.session == session)
-        query = _select(*conditions).order_by(jobs.c.created)
-        return [_job(row) for row in connection.execute(query)]
-
-    def claim(
-        self,
-        runner: str,
-        most: int,
-        *,
-        least_priority: int = 0,
-        kinds: Collection[str] | None = None,
-        known: Collection[str] | None = None,
-        other_than: Collection[str] = (),
-    ) -> list[Job]:
-        """Make unfinished jobs that nobody runs the runner's, `most` at once, those of the highest
-        priority first, then those of the session of which the fewest are run, then the oldest.
-
-        kinds : that the runner knows; all without
-        known : all jobs that the runner runs; another one that is its own comes again, for the
-            answer to its claim was lost
-        other_than : sessions of which none is claimed
-
-        Whichever of them was asked to stop is cancelled instead, unless there are parts of it, of
-        which its runner may make a result.
-        """
-        now = self._database.now
-        # Also where a clock went back, the lease has run out.
-        lapsed = func.abs(jobs.c.heartbeat_at - now) > LEASE
-        free = jobs.c.state.in_(UNFINISHED) & or_(
-            jobs.c.runner.is_(None),
-            (jobs.c.runner != runner) & lapsed,
-            *([] if known is None else [(jobs.c.runner == runner) & jobs.c.id.not_in(known)]),
-        )
-        free &= (jobs.c.priority >= least_priority) & jobs.c.session.not_in(other_than)
-        if kinds is not None:
-            free &= jobs.c.kind.in_(kinds)
-        with self._database.reading() as connection:
-            # Mostly there is none, and nobody's writing is held up.
-            if connection.execute(select(jobs.c.id).where(free).limit(1)).first() is None:
-                return []
-        with self._database.writing() as connection:
-            stopped = select(jobs.c.id).where(free, _to_cancel())
-            urgency = jobs.c.cancel_asked.desc(), jobs.c.priority.desc()
-            order = (*urgency, _run_of_session(), jobs.c.created, jobs.c.id)
-            waiting = select(jobs.c.id).where(free, ~_to_cancel()).order_by(*order)
-            self._cancel(connection, _locked(connection, stopped))
-            taken = _locked(connection, waiting.limit(most))
-            _take_back(connection, jobs.c.id.in_(taken), runner=runner, heartbeat_at=now)
-            query = _select(jobs.c.id.in_(taken)).order_by(*order)
-            return [_job(row) for row in connection.execute(query)]
-
-    def heartbeat(self, runner: str) -> Beat:
-        """Renew the leases of a runner's jobs; which those still are."""
-        with self._database.writing() as connection:
-            # In one order, so that nobody who locks several of them waits in a circle.
-            held = select(jobs.c.id).where(_of(runner)).order_by(jobs.c.id).with_for_update()
-            mine = connection.execute(held).scalars().all()
-            renewed = connection.execute(
-                update(jobs)
-                .where(jobs.c.id.in_(mine))
-                .values(heartbeat_at=self._database.now)
-                .returning(jobs.c.id, jobs.c.cancel_asked)
-            ).all()
-        return Beat(
-            frozenset(row.id for row in renewed),
-            frozenset(row.id for row in renewed if row.cancel_asked),
-        )
-
-    def release(self, runner: str) -> None:
-        """Give up a runner's jobs, for the next one to claim."""
-        with self._database.writing() as connection:
-            held = select(jobs.c.id).where(_of(runner)).order_by(jobs.c.id).with_for_update()
-            mine = connection.execute(held).scalars().all()
-            asked = select(jobs.c.id).where(jobs.c.id.in_(mine), _to_cancel())
-            self._cancel(connection, connection.execute(asked).scalars().all())
-            connection.execute(
-                update(jobs)
-                .where(jobs.c.id.in_(mine), _of(runner))
-                .values(state="queued", started=None, runner=None)
-            )
-
-    def take_back_all(self) -> None:
-        """Make every unfinished job claimable, where no other service can be running one."""
-        with self._database.writing() as connection:
-            _take_back(connection, jobs.c.runner.is_not(None), runner=None)
-
-    def start(self, job: str, runner: str) -> bool:
-        """Mark its runner's queued job as running; False if it is not queued, or not its own, any
-        more.
-        """
-        return self._move(job, runner, ("queued",), state="running", started=self._database.now)
-
-    def requeue(self, job: str, runner: str) -> bool:
-        """Take a job back whose worker was lost, which stays its runner's; False if it has ended
-        meanwhile, or is another's.
-        """
-        return self._move(
-            job, runner, UNFINISHED, state="queued", started=None, attempts=jobs.c.attempts + 1
-        )
+        query = select_jobs(*conditions).order_by(jobs.c.created)
+        return [job_of(row) for row in connection.execute(query)]
 
     def ask_to_cancel(self, session: str, job: str) -> Job:
-        """Have a job's runner stop it; one that has no runner and no parts is cancelled at once."""
+        """Have a job's runner stop it; one without parts that nobody runs, or that has not started,
+        is cancelled at once.
+        """
         with self._database.writing() as connection:
             mine = (jobs.c.session == session) & (jobs.c.id == job)
             connection.execute(
                 update(jobs).where(mine, jobs.c.state.in_(UNFINISHED)).values(cancel_asked=True)
             )
-            unowned = select(jobs.c.id).where(
-                mine, _to_cancel(), jobs.c.state.in_(UNFINISHED), jobs.c.runner.is_(None)
-            )
-            self._cancel(connection, connection.execute(unowned).scalars().all())
+            idle = (jobs.c.state == "queued") | jobs.c.runner.is_(None)
+            unbegun = select(jobs.c.id).where(mine, to_cancel(), jobs.c.state.in_(UNFINISHED), idle)
+            cancel_in(connection, self._database, connection.execute(unbegun).scalars().all())
         return self.get(session, job)
 
-    def hold_in(self, connection: Connection, job: str) -> bool:
-        """Hold a job's row to the end of a transaction, before its files; False where it has ended
-        or is gone.
+    def hold_in(self, connection: Connection, job: str) -> Row[Any] | None:
+        """Hold a job's row to the end of a transaction, before its files; whose it is, as `runner`.
+        None where it has ended or is gone.
         """
-        row = select(jobs.c.id).where(jobs.c.id == job, jobs.c.state.in_(UNFINISHED))
-        return connection.execute(row.with_for_update()).one_or_none() is not None
+        row = select(jobs.c.runner).where(jobs.c.id == job, jobs.c.state.in_(UNFINISHED))
+        return connection.execute(row.with_for_update()).one_or_none()
 
     def finish_in(
         self,
@@ -328,73 +169,21 @@ class JobStore:
             connection.execute(insert(job_files).values(job=job, sha256=file))
         connection.execute(delete(job_parts).where(job_parts.c.job == job))
 
-    def save_progress(self, job: str, runner: str, progress: Mapping[str, Any]) -> None:
-        """Keep how far its runner's job has come."""
-        self._move(job, runner, UNFINISHED, progress=json.dumps(dict(progress)))
-
     def delete(self, session: str, job: str) -> None:
         """Remove a job and its result."""
         with self._database.writing() as connection:
             connection.execute(delete(jobs).where(jobs.c.session == session, jobs.c.id == job))
 
-    def _move(self, job: str, runner: str, states: tuple[str, ...], **values: Any) -> bool:
-        with self._database.writing() as connection:
-            moved = connection.execute(
-                update(jobs)
-                .where(jobs.c.id == job, jobs.c.runner == runner, jobs.c.state.in_(states))
-                .values(**values)
-            )
-        return bool(moved.rowcount)
-
-    def _cancel(self, connection: Connection, chosen: Sequence[str]) -> None:
-        values = {"state": "cancelled", "finished": self._database.now}
-        connection.execute(update(jobs).where(jobs.c.id.in_(chosen)).values(**values))
-        connection.execute(delete(job_parts).where(job_parts.c.job.in_(chosen)))
-
-
-def _to_cancel() -> ColumnElement[bool]:
-    """Whether a job was asked to stop of which no runner has anything to keep."""
-    return jobs.c.cancel_asked & ~exists().where(job_parts.c.job == jobs.c.id)
-
-
-def _run_of_session() -> ScalarSelect[int]:
-    """How many jobs of a job's session somebody runs."""
-    others = jobs.alias()
-    mine = (others.c.session == jobs.c.session) & others.c.state.in_(UNFINISHED)
-    query = select(func.count()).where(mine, others.c.runner.is_not(None))
-    return query.correlate(jobs).scalar_subquery()
-
-
-def _of(runner: str) -> ColumnElement[bool]:
-    return (jobs.c.runner == runner) & jobs.c.state.in_(UNFINISHED)
-
-
-def _locked(connection: Connection, chosen: Select[Any]) -> Sequence[str]:
-    """Ids that nobody else holds at the moment, held to the end of the transaction."""
-    return connection.execute(chosen.with_for_update(skip_locked=True)).scalars().all()
-
-
-def _take_back(connection: Connection, chosen: ColumnElement[bool], **values: Any) -> None:
-    """Queue unfinished jobs again; those that ran have lost their runner."""
-    lost = case((jobs.c.state == "running", 1), else_=0)
-    connection.execute(
-        update(jobs)
-        .where(chosen, jobs.c.state.in_(UNFINISHED))
-        .values(state="queued", started=None, restarts=jobs.c.restarts + lost, **values)
-    )
-
-
-def _select(*conditions: Any) -> Any:
-    return select(jobs).where(*conditions)
-
 
 def _known(connection: Connection, session: str, key: str | None, asked: str) -> Job | None:
     if key is None:
         return None
-    row = connection.execute(_select(jobs.c.session == session, jobs.c.key == key)).one_or_none()
+    row = connection.execute(
+        select_jobs(jobs.c.session == session, jobs.c.key == key)
+    ).one_or_none()
     if row is None:
         return None
-    kept = _job(row)
+    kept = job_of(row)
     if kept.spec["asked"] != asked:
         raise InvalidRequest(
             f"The key is that of another request, which {kept.kind} {kept.id} answers; give each a"
@@ -402,25 +191,3 @@ def _known(connection: Connection, session: str, key: str | None, asked: str) ->
             field="key",
         )
     return kept
-
-
-def _job(row: Row[Any], result: str | None = None, file: str | None = None) -> Job:
-    return Job(
-        id=row.id,
-        session=row.session,
-        kind=row.kind,
-        state=row.state,
-        spec=json.loads(row.spec),
-        progress=json.loads(row.progress),
-        error=json.loads(row.error) if row.error else None,
-        created=row.created,
-        started=row.started,
-        finished=row.finished,
-        attempts=row.attempts,
-        restarts=row.restarts,
-        runner=row.runner,
-        cancel_asked=row.cancel_asked,
-        priority=row.priority,
-        result=json.loads(result) if result else None,
-        file=file,
-    )

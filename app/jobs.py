@@ -8,19 +8,17 @@ process that runs it, and in the database once a second.
 import asyncio
 from collections import Counter
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import aclosing, contextmanager
 from dataclasses import replace
 from typing import Any
 
 from .cluster import Cluster
 from .dispatcher import Dispatcher
-from .errors import Busy, Unavailable
+from .errors import Busy, NotFound, Unavailable
+from .followers import Followers
 from .job_kinds import Kind
-from .job_store import Job
+from .job_row import Job
 from .store import Store
-
-POLL_EVERY = 1.0
-"""Time after which a follower looks at the database: another process may be running the job, s."""
 
 
 class Jobs:
@@ -38,7 +36,7 @@ class Jobs:
         """Jobs are sent once `ready` returns, and only if it returns True, and while `taking`."""
         self._store = store
         self._kinds = kinds
-        self._followers: dict[str, set[asyncio.Event]] = {}
+        self._followers = Followers(store.jobs)
         self._watching: Counter[str] = Counter()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._dispatcher = Dispatcher(store, cluster, kinds, self._wake, ready, taking)
@@ -95,8 +93,8 @@ class Jobs:
 
     @contextmanager
     def watching(self, session: str, most: int) -> Iterator[None]:
-        """Count who follows a job of a session; for the event loop. Each looks at the database
-        every second.
+        """Count who follows a job of a session; for the event loop. For each the database is asked
+        every second whether it may.
         """
         if self._watching[session] >= most:
             raise Busy(
@@ -115,39 +113,25 @@ class Jobs:
     async def follow(
         self, session: str, job: str, require: Callable[[], object] = lambda: None
     ) -> AsyncIterator[Job]:
-        """The job as it stands, then again after each change, until its final state; nothing while
-        the database is away. Before each look `require` may refuse.
+        """The job as it stands, without its result, then again after each change, until its final
+        state; nothing while the database is away. Each time `require` may refuse before.
         """
 
-        def look() -> Job | None:
-            with suppress(Unavailable):
-                require()
-                return self.get(session, job)
-
-        changed = asyncio.Event()
-        self._followers.setdefault(job, set()).add(changed)
-        try:
-            while True:
-                changed.clear()
-                now = await asyncio.to_thread(look)
-                if now is not None:
-                    yield now
-                    if now.ended:
-                        return
-                with suppress(TimeoutError):
-                    await asyncio.wait_for(changed.wait(), POLL_EVERY)
-        finally:
-            followers = self._followers[job]
-            followers.discard(changed)
-            if not followers:
-                del self._followers[job]
+        async with aclosing(self._followers.looks(job)) as looks:
+            async for found in looks:
+                try:
+                    await asyncio.to_thread(require)
+                except Unavailable:
+                    continue
+                if found is None or found.session != session:
+                    raise NotFound("There is no job with that id in this session.")
+                yield self._with_progress(found)
+                if found.ended:
+                    return
 
     def _stop(self, job: Job) -> None:
-        if job.state == "queued" and not self._store.parts(job.id):
-            self._store.finish_job(job.id, "cancelled")
-            self._wake(job.id)
-        else:
-            self._store.jobs.ask_to_cancel(job.session, job.id)
+        self._store.jobs.ask_to_cancel(job.session, job.id)
+        self._wake(job.id)
         self._dispatcher.cancel(job.id)
 
     def _with_progress(self, job: Job) -> Job:
@@ -156,8 +140,4 @@ class Jobs:
 
     def _wake(self, job: str) -> None:
         if self._loop is not None and not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._set, job)
-
-    def _set(self, job: str) -> None:
-        for follower in self._followers.get(job, ()):
-            follower.set()
+            self._loop.call_soon_threadsafe(self._followers.wake, job)

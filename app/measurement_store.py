@@ -11,12 +11,13 @@ from sqlalchemy import Connection, Row, delete, func, insert, select, update
 
 from .data_directory import DataDirectory
 from .database import Database
-from .errors import Busy, Conflict, NotFound
+from .errors import Busy, Conflict, Deleted, NotFound, Unavailable
 from .file_store import FileStore
 from .job_store import JobStore
 from .measurement import Measurement, NewMeasurement
 from .session_row import lock_session, mark_used
 from .settings import Limits
+from .storage import OUT_OF_ORDER, files_in_a_sentence
 from .tables import measurements, uploads
 
 ABSENT = "There is no measurement with that id in this session."
@@ -100,8 +101,22 @@ class MeasurementStore:
         return _measurement(row)
 
     def original(self, measurement: Measurement) -> Path:
-        """Place of a measurement's original file."""
-        return self._directory.original(measurement.sha256)
+        """Place of a measurement's original file; Unavailable while the disk is away, NotFound
+        where the measurement was deleted meanwhile, Deleted where only its file was.
+        """
+        name, sha256 = measurement.name, measurement.sha256
+        with files_in_a_sentence():
+            place = self._directory.original(sha256)
+            if place.is_file():
+                return place
+            if not self._directory.lacks(sha256):
+                raise Unavailable(OUT_OF_ORDER, retry_after=30)
+        if not self._files.has_row(sha256):
+            raise NotFound(f"{name} has been deleted meanwhile; choose another measurement.")
+        raise Deleted(
+            f"{name} is gone from the service's data directory; add the recording again, or restore"
+            " a backup."
+        )
 
     def set_notes(
         self,

@@ -6,7 +6,7 @@ from ..engine.errors import ProblemError
 from ..engine.parameters import parameter
 from .errors import Conflict
 from .identification_job import build_problem, fitted_recordings
-from .job_store import Job
+from .job_row import Job
 from .schemas import ProfileRequest
 from .store import Store
 from .worker import Attempt

@@ -9,7 +9,7 @@ than the settings allow.
 import hashlib
 import threading
 from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
 from tempfile import NamedTemporaryFile
@@ -39,6 +39,9 @@ REMEMBERED_VALUES = 8_000_000
 
 ANSWER = 3.0
 """Times its processor time that a process which reads a file has for an answer."""
+
+BLOCK = 2**20
+"""Bytes that are read at once."""
 
 REMEMBERED_COLUMNS = 20_000
 """Columns of surveys kept in memory, some kB each."""
@@ -110,9 +113,23 @@ class Recordings:
         key = measurement.sha256, measurement.name
         return self._surveys.made(key, surveyed, lambda made: len(made.columns))
 
-    def table(self, measurement: Measurement) -> "AbstractContextManager[ChildTable]":
-        """The file as a table, for as long as the `with` lasts."""
-        return self._opened(self._store.measurements.original(measurement), measurement.name)
+    @contextmanager
+    def table(self, measurement: Measurement) -> "Iterator[ChildTable]":
+        """The file as a table, for as long as the `with` lasts; errors as of
+        `MeasurementStore.original`, and MeasurementError where it is there, but spoilt.
+        """
+        original = self._store.measurements.original
+        try:
+            with self._opened(original(measurement), measurement.name) as table:
+                yield table
+        except UnmappedError:
+            raise
+        except MeasurementError:
+            # Or it is the disk, which the process that reads cannot tell from a spoilt file.
+            with _readable(measurement.name), original(measurement).open("rb") as file:
+                while file.read(BLOCK):
+                    pass
+            raise
 
     def parse(self, measurement: Measurement, noise: Mapping[str, float] | None = None) -> Run:
         """Read a measurement's file under its mapping; MeasurementError says what is wrong with it
@@ -179,8 +196,11 @@ def _readable(name: str) -> Iterator[None]:
         raise MeasurementError(
             f"{name}: the file is too large or too deep to read; send a plain CSV."
         ) from None
-    except FileNotFoundError:
-        raise NotFound(f"{name} has been deleted meanwhile; choose another measurement.") from None
+    except MeasurementError as error:
+        # The process that was to read it could not be started.
+        if isinstance(error.__cause__, OSError) and (trouble := trouble_of(error.__cause__)):
+            raise trouble from error
+        raise
     except OSError as error:
         raise trouble_of(error) or MeasurementError(
             f"{name}: the file cannot be read just now ({error.strerror}); try again later."

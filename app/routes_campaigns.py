@@ -15,7 +15,7 @@ from .campaign_job import KIND, check_and_fill
 from .errors import Conflict, NotFound
 from .job_kinds import as_asked
 from .job_routes import View, job_router, submitted
-from .job_store import Job
+from .job_row import Job
 from .measurement import Measurement, NewMeasurement
 from .measurement_view import measurements_to_json
 from .schemas import CampaignRequest

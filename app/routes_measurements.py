@@ -118,7 +118,7 @@ def original(sid: SessionId, mid: str, services: Shared) -> FileResponse:
     """The uploaded file, byte for byte."""
     kept = services.store.measurements.get(sid, mid)
     return FileResponse(
-        services.store.files.original(kept.sha256),
+        services.store.measurements.original(kept),
         filename=kept.name,
         media_type="application/octet-stream",
     )

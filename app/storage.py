@@ -18,6 +18,7 @@ NOT_TO_BE_USED = (
     errno.ESTALE,
     errno.ETIMEDOUT,
 )
+SHORT = (errno.EAGAIN, errno.EMFILE, errno.ENFILE, errno.ENOMEM)
 OUT_OF_ORDER = (
     "The service's data directory cannot be used; see that it is there, on a disk that works, and"
     " may be written, then try again."
@@ -25,9 +26,15 @@ OUT_OF_ORDER = (
 
 
 def trouble_of(error: OSError) -> Unavailable | None:
-    """None for what is no trouble of a disk."""
+    """What passes, by itself or once the disk is seen to; None for what is neither."""
     if error.errno in FULL:
         return StorageFull()
+    if error.errno in SHORT:
+        return Unavailable(
+            "The service has too many files open, or too little memory, at the moment; try again"
+            " shortly.",
+            retry_after=5,
+        )
     if error.errno in NOT_TO_BE_USED:
         return Unavailable(OUT_OF_ORDER, retry_after=30)
     return None

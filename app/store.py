@@ -16,6 +16,7 @@ from .data_directory import DataDirectory, database_of
 from .database import Database
 from .errors import NotFound
 from .file_store import FileStore
+from .job_leases import JobLeases
 from .job_store import JobStore
 from .key_store import KeyStore
 from .mapping_store import MappingStore
@@ -44,6 +45,7 @@ class Store:
         self.database, self.directory = _open_shared(path, database) if database else _open(path)
         self.files = FileStore(self.database, self.directory, limits)
         self.jobs = JobStore(self.database, limits)
+        self.leases = JobLeases(self.database)
         self.setups = SetupStore(self.database, limits)
         self.mappings = MappingStore(self.database, self.files)
         self.measurements = MeasurementStore(
@@ -58,7 +60,7 @@ class Store:
         else:
             # The lock of the directory tells that whoever was at them is gone.
             self.directory.sweep()
-            self.jobs.take_back_all()
+            self.leases.take_back_all()
         self.files.sweep()
 
     def close(self) -> None:
@@ -68,12 +70,23 @@ class Store:
 
     # Jobs and their files
 
-    def finish_job(self, job: str, state: str, *, file: bytes | None = None, **found: Any) -> bool:
+    def finish_job(
+        self,
+        job: str,
+        state: str,
+        *,
+        runner: str | None = None,
+        file: bytes | None = None,
+        **found: Any,
+    ) -> bool:
         """Give a job its final state, see `JobStore.finish_in`, and keep the file it made; False
-        if it had one.
+        if it had one, or is another's: whoever took it over goes on with it.
+
+        runner : whose it is;  None where it is nobody's
         """
         with self.database.writing() as connection:
-            if not self.jobs.hold_in(connection, job):
+            held = self.jobs.hold_in(connection, job)
+            if held is None or held.runner != runner:
                 return False
             sha256 = None if file is None else self.files.keep(connection, [file])[0]
             self.jobs.finish_in(connection, job, state, file=sha256, **found)
@@ -93,7 +106,7 @@ class Store:
         """
         mine = (job_parts.c.job == job) & (job_parts.c.name == name)
         with self.database.writing() as connection:
-            if not self.jobs.hold_in(connection, job):
+            if self.jobs.hold_in(connection, job) is None:
                 return False
             if connection.execute(select(job_parts.c.name).where(mine)).one_or_none() is None:
                 [sha256] = self.files.keep(connection, [data])

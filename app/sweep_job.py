@@ -13,7 +13,7 @@ from typing import Any
 from .errors import OverBudget
 from .excitation_mode import mode_of
 from .job_kinds import PATIENT, Division, Kind, Progress, digest
-from .job_store import Job
+from .job_row import Job
 from .measurement import Measurement, stated
 from .recordings import Recordings, as_stated
 from .schemas import FullFactorialForm, SweepRequest

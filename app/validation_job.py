@@ -12,7 +12,7 @@ from ..engine.vehicle_file import vehicle_from_json
 from .errors import InvalidRequest
 from .identification_job import check_budget, done, marked_runs
 from .job_kinds import Kind
-from .job_store import Job
+from .job_row import Job
 from .measurement import Measurement, stated
 from .measurement_view import data_keys
 from .recordings import Recordings, as_stated

@@ -119,7 +119,7 @@ def test_everything_comes_back(tmp_path, database, other_database, command, caps
     for session, token in zip(sessions, tokens, strict=True):
         assert store.owners.opens(session, user=None, token=token)
     assert len(set(store.directory.names())) == 7
-    assert len(store.jobs.claim("me", 5)) == 2
+    assert len(store.leases.claim("me", 5)) == 2
     store.close()
 
 
@@ -375,7 +375,7 @@ def test_an_older_backup_is_brought_up_to_date(tmp_path, backup, command, versio
     [kept] = store.measurements.of_session("s1")
     assert store.measurements.original(kept).read_bytes() == FILES[0]
     assert store.jobs.get("s1", "done").result == {"cost": 1.5}
-    assert [job.id for job in store.jobs.claim("me", 5)] == ["queued", "running"]
+    assert [job.id for job in store.leases.claim("me", 5)] == ["queued", "running"]
     with pytest.raises(NotFound):
         store.sessions.get("s2")
     store.close()

@@ -1,11 +1,16 @@
 """The seam to Dask: results, progress, cancelling, lost workers, on both kinds of cluster."""
 
 import json
+import os
 import queue
+import signal
+import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 
 import cloudpickle
+import psutil
 import pytest
 from ridetune.app.cluster import Cluster
 from ridetune.app.errors import Unavailable
@@ -70,8 +75,6 @@ def heard() -> Heard:
 
 def test_a_task_gives_its_result_and_reports_on_the_way(cluster, heard):
     """At the lowest priority, in another process, with the progress told as it comes."""
-    import os
-
     cluster.submit("double", tasks.double, 21, heard)
     ending = heard.end_of("double")
     assert ending["state"] == "done"
@@ -137,6 +140,51 @@ def test_a_deaf_task_is_killed_after_its_grace_and_the_worker_replaced(cluster, 
         assert heard.end_of(name)["state"] == "cancelled"
 
 
+def frozen(cluster: Cluster, heard: Heard) -> int:
+    """The process of a worker that was stopped within the task "frozen", as by a debugger."""
+    cluster.submit("frozen", tasks.ignore, None, heard)
+    process = heard.progress.get(timeout=PATIENCE)[1]["process"]
+    os.kill(process, signal.SIGSTOP)
+    return process
+
+
+def in_time(work: Callable[[], object]) -> bool:
+    """Whether something that may hang comes to its end."""
+    thread = threading.Thread(target=work, daemon=True)
+    thread.start()
+    thread.join(PATIENCE)
+    return not thread.is_alive()
+
+
+def test_a_frozen_worker_keeps_no_other_task_from_being_cancelled(cluster, heard):
+    """Neither one that stops nor one that has to be killed; then it is killed itself."""
+    until(lambda: cluster.width() == 2)
+    process = frozen(cluster, heard)
+    try:
+        for name, task in (("soft", tasks.wait), ("deaf", tasks.ignore)):
+            cluster.submit(name, task, None, heard)
+            heard.progress.get(timeout=PATIENCE)
+            assert in_time(lambda name=name: cluster.cancel(name, grace=0.2))
+            assert heard.end_of(name)["state"] == "cancelled"
+        assert in_time(lambda: cluster.cancel("frozen", grace=0.2))
+        assert heard.end_of("frozen")["state"] == "cancelled"
+        until(lambda: not psutil.pid_exists(process))
+    finally:
+        with suppress(ProcessLookupError):
+            os.kill(process, signal.SIGCONT)
+
+
+def test_a_frozen_worker_does_not_keep_a_cluster_from_closing(tmp_path, heard):
+    cluster = Cluster("", tmp_path, workers=1)
+    process = frozen(cluster, heard)
+    try:
+        assert in_time(cluster.close)
+        assert not psutil.pid_exists(process)
+    finally:
+        with suppress(ProcessLookupError):
+            os.kill(process, signal.SIGCONT)
+
+
 def test_a_task_that_waits_for_a_worker_is_cancelled_at_once(cluster, heard):
     for name in ("first", "second", "third"):
         cluster.submit(name, tasks.wait, None, heard)
@@ -187,8 +235,6 @@ def test_an_unforeseen_error_is_logged_here_and_not_told(cluster, heard, caplog)
 
 def test_an_idle_cluster_leaves_and_comes_back(tmp_path, heard):
     """Its processes are gone once nothing has run for a while; the next task starts new ones."""
-    import psutil
-
     cluster = Cluster("", tmp_path, workers=1, idle_seconds=0.1)
     try:
         cluster.submit("one", tasks.double, 1, heard)

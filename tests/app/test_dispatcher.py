@@ -1,10 +1,11 @@
 """Which job runs when, what is kept of it, and who goes on with it; the cluster is a stand-in."""
 
+import errno
 from dataclasses import replace
 from threading import Event
 
 import pytest
-from ridetune.app import dispatcher as module
+from ridetune.app import dispatcher, gatherer, jobs_under_way, lease_keeper
 from ridetune.app.dispatcher import Dispatcher
 from ridetune.app.errors import Unavailable
 from ridetune.app.job_kinds import PATIENT, Division, Kind
@@ -50,12 +51,13 @@ class Team:
         self.sessions: dict[str, str] = {}
         self.dispatchers: list[Dispatcher] = []
         self.taking = True
+        self.changed: list[str] = []
 
     def dispatch(self) -> StandIn:
         """The cluster of one more."""
         cluster = StandIn("", None)
         made = Dispatcher(
-            self.store, cluster, KINDS, lambda job: None, lambda: True, lambda: self.taking
+            self.store, cluster, KINDS, self.changed.append, lambda: True, lambda: self.taking
         )
         self.dispatchers.append(made)
         made.start()
@@ -76,8 +78,12 @@ class Team:
 
 @pytest.fixture
 def team(tmp_path, database, monkeypatch):
-    monkeypatch.setattr(module, "LOOK_EVERY", 0.02)
-    monkeypatch.setattr(module, "RETRY_AFTER", 0.02)
+    monkeypatch.setattr(dispatcher, "LOOK_EVERY", 0.02)
+    monkeypatch.setattr(dispatcher, "RETRY_AFTER", 0.02)
+    monkeypatch.setattr(gatherer, "GATHER_AGAIN_AFTER", 0.02)
+    monkeypatch.setattr(jobs_under_way, "RECORD_EVERY", 0.02)
+    monkeypatch.setattr(jobs_under_way, "REWRITE_AFTER", 0.02)
+    monkeypatch.setattr(lease_keeper, "BEAT_EVERY", 0.02)
     team = Team(tmp_path, database)
     yield team
     for one in team.dispatchers:
@@ -224,7 +230,7 @@ def test_a_cancelled_sweep_ends_once_nothing_of_it_runs(team):
     make(cluster, job, "a")
     team.store.jobs.ask_to_cancel(team.ann, job)  # as another process would
     until(lambda: team.state(job) == "cancelled")
-    assert cluster.tasks == {}
+    until(lambda: cluster.tasks == {})
 
 
 def test_a_unit_that_fails_fails_its_job_alone(team):
@@ -251,6 +257,65 @@ def test_a_job_whose_lease_another_took_is_let_go(team):
     assert team.state(fit) == "queued"
 
 
+def test_the_end_of_a_job_that_another_took_is_not_its_end(team, monkeypatch):
+    """However late it is noticed: the leases' thread is away."""
+
+    def away(runner):
+        raise Unavailable("The database cannot be reached.")
+
+    monkeypatch.setattr(team.store.leases, "heartbeat", away)
+    cluster = team.dispatch()
+    fits = {state: team.submit("fit", team.ann) for state in ("done", "failed")}
+    until(lambda: set(fits.values()) == set(cluster.tasks))
+    with team.store.database.writing() as connection:
+        connection.execute(update(jobs).values(runner="another"))
+    cluster.end(fits["done"], "done", result={"cost": 1.0})
+    cluster.end(fits["failed"], "failed", error={"code": "x", "detail": "y"})
+    until(lambda: set(fits.values()) <= set(team.changed))
+    for fit in fits.values():
+        assert team.state(fit) == "queued"
+        assert team.store.finish_job(fit, "done", runner="another")
+
+
+def test_what_an_earlier_attempt_of_a_unit_tells_is_not_of_the_next(team):
+    """As where a lease was lost and taken again: the old task is still being stopped."""
+    cluster = team.dispatch()
+    fit = team.submit("fit", team.ann)
+    until(lambda: fit in cluster.tasks)
+    earlier = cluster.tasks[fit][2]
+    cluster.lose(fit, with_worker=False)
+    until(lambda: fit in cluster.tasks)
+    error = {"code": "worker-lost", "detail": "It is gone."}
+    ending = {"state": "failed", "result": None, "error": error, "progress": {}}
+    earlier.task_ended(fit, ending)
+    cluster.end(fit, "done", result={"cost": 1.0})
+    until(lambda: team.store.jobs.get(team.ann, fit).ended)
+    assert team.state(fit) == "done"
+
+
+def test_of_progress_told_while_the_database_is_away_only_the_latest_waits(team, monkeypatch):
+    """So that the memory it takes is bounded however long that lasts."""
+    cluster = team.dispatch()
+    ended, fit = team.submit("fit", team.bob), team.submit("fit", team.ann)
+    until(lambda: {ended, fit} == set(cluster.tasks))
+    finish, asked, back = team.store.finish_job, Event(), Event()
+
+    def away(*told, **found):
+        asked.set()
+        if not back.is_set():
+            raise Unavailable("The database cannot be reached.")
+        return finish(*told, **found)
+
+    monkeypatch.setattr(team.store, "finish_job", away)
+    cluster.end(ended, "done", result={})
+    asked.wait(10)
+    for cost in range(1000):
+        cluster.report(fit, cost=cost)
+    back.set()
+    until(lambda: team.dispatchers[0].progress(fit) == {"cost": 999})
+    assert team.changed.count(fit) == 1
+
+
 def test_nothing_that_was_told_is_lost_while_the_database_is_away(team, monkeypatch):
     cluster = team.dispatch()
     fit = team.submit("fit", team.ann)
@@ -272,7 +337,7 @@ def test_nothing_that_was_told_is_lost_while_the_database_is_away(team, monkeypa
 
 def test_a_claim_whose_answer_was_lost_is_not_a_job_lost(team, monkeypatch):
     """The database has committed it, but the connection broke before it could tell."""
-    claim, broken = team.store.jobs.claim, []
+    claim, broken = team.store.leases.claim, []
 
     def claimed_unheard(*asked, **more):
         found = claim(*asked, **more)
@@ -281,7 +346,7 @@ def test_a_claim_whose_answer_was_lost_is_not_a_job_lost(team, monkeypatch):
             raise Unavailable("The database went away.")
         return found
 
-    monkeypatch.setattr(team.store.jobs, "claim", claimed_unheard)
+    monkeypatch.setattr(team.store.leases, "claim", claimed_unheard)
     fit = team.submit("fit", team.ann)
     cluster = team.dispatch()
     until(lambda: fit in cluster.tasks)
@@ -327,6 +392,25 @@ def test_a_job_of_which_nobody_knows_how_slow_it_is_fails_alone(team, monkeypatc
     bad, good = team.submit("campaign", team.ann, "ab"), team.submit("sweep", team.ann, "ab")
     until(lambda: team.state(bad) == "failed")
     until(lambda: f"{good}/a" in cluster.tasks)
+
+
+@pytest.mark.parametrize("number", [errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ENOSPC])
+def test_a_part_waits_for_what_there_is_too_little_of(team, monkeypatch, number):
+    """Files, memory, or room on the disk; the part is kept once there is enough again."""
+    cluster = team.dispatch()
+    job = team.submit("sweep", team.ann, "a")
+    keep, refused = team.store.directory.keep, []
+
+    def short(*told):
+        refused.append(told)
+        if len(refused) < 3:
+            raise OSError(number, "injected")
+        keep(*told)
+
+    monkeypatch.setattr(team.store.directory, "keep", short)
+    make(cluster, job, "a")
+    until(lambda: job in cluster.tasks or team.store.jobs.get(team.ann, job).ended)
+    assert cluster.kept.get(job) == {"a": b"a"}
 
 
 def test_a_part_that_the_disk_lost_is_made_again(team):
@@ -443,7 +527,7 @@ def test_units_that_are_lost_now_and_then_do_not_fail_their_job(team):
         until(lambda: f"{job}/{unit}" in cluster.tasks)
         cluster.lose(f"{job}/{unit}", with_worker=True)
         make(cluster, job, unit)
-    for _ in range(module.MOST_ATTEMPTS):
+    for _ in range(jobs_under_way.MOST_ATTEMPTS):
         assert team.state(job) != "failed"
         until(lambda: f"{job}/d" in cluster.tasks)
         cluster.lose(f"{job}/d", with_worker=True)

@@ -2,7 +2,7 @@
 
 import pytest
 from ridetune.app.errors import Busy, NotFound
-from ridetune.app.job_store import LEASE
+from ridetune.app.job_leases import LEASE
 from ridetune.app.measurement import NewMeasurement
 from ridetune.app.settings import Limits
 from ridetune.app.store import Store
@@ -40,7 +40,7 @@ def queued(store: Store, session: str, priority: int = 0) -> str:
 
 
 def claimed(store: Store, runner: str, most: int = 10) -> list[str]:
-    return [job.id for job in store.jobs.claim(runner, most)]
+    return [job.id for job in store.leases.claim(runner, most)]
 
 
 def test_a_job_is_claimed_once_by_priority_then_by_age(store, session):
@@ -74,7 +74,7 @@ def test_a_lost_runner_s_jobs_are_taken_over_once_the_lease_has_run_out(
     """Also where the clock went back. What had not started has not been lost; what had, has."""
     running, waiting = queued(store, session), queued(store, session)
     claimed(store, "lost")
-    assert store.jobs.start(running, "lost")
+    assert store.leases.start(running, "lost")
     later(passed / 2)
     assert claimed(store, "b") == []
     later(passed)
@@ -84,8 +84,8 @@ def test_a_lost_runner_s_jobs_are_taken_over_once_the_lease_has_run_out(
         ("queued", None, 1, 0),
         ("queued", None, 0, 0),
     ]
-    assert store.jobs.heartbeat("lost").jobs == frozenset()
-    assert not store.jobs.start(waiting, "lost")
+    assert store.leases.heartbeat("lost").jobs == frozenset()
+    assert not store.leases.start(waiting, "lost")
 
 
 def test_a_heartbeat_renews_the_lease(store, session, later):
@@ -94,7 +94,7 @@ def test_a_heartbeat_renews_the_lease(store, session, later):
     for beats in range(1, 5):
         later(beats * LEASE * 0.6)
         assert claimed(store, "b") == []
-        assert store.jobs.heartbeat("a").jobs == {job}
+        assert store.leases.heartbeat("a").jobs == {job}
 
 
 def test_a_runner_that_slept_keeps_what_nobody_took(store, session, later):
@@ -103,34 +103,37 @@ def test_a_runner_that_slept_keeps_what_nobody_took(store, session, later):
     claimed(store, "a")
     later(LEASE + 1)
     assert claimed(store, "a") == []
-    assert store.jobs.heartbeat("a").jobs == {job}
+    assert store.leases.heartbeat("a").jobs == {job}
     assert claimed(store, "b") == []
 
 
-def test_only_its_runner_moves_a_job_but_the_first_end_is_the_end(store, session):
-    """Who has lost a job may still be the first that is done with it: the result is the same."""
+def test_only_its_runner_moves_and_ends_a_job_and_the_first_end_is_the_end(store, session):
     job = queued(store, session)
     claimed(store, "a")
-    assert not store.jobs.start(job, "b")
-    assert not store.jobs.requeue(job, "b")
-    store.jobs.save_progress(job, "b", {"cost": 1.0})
+    assert not store.leases.start(job, "b")
+    assert not store.leases.requeue(job, "b")
+    store.leases.save_progress(job, "b", {"cost": 1.0})
     assert store.jobs.get(session, job).progress == {}
-    assert store.jobs.start(job, "a")
-    store.jobs.save_progress(job, "a", {"cost": 1.0})
+    assert store.leases.start(job, "a")
+    store.leases.save_progress(job, "a", {"cost": 1.0})
     assert store.jobs.get(session, job).progress == {"cost": 1.0}
-    assert store.jobs.requeue(job, "a")
+    assert store.leases.requeue(job, "a")
     kept = store.jobs.get(session, job)
     assert (kept.state, kept.runner, kept.attempts, kept.restarts) == ("queued", "a", 1, 0)
-    assert store.finish_job(job, "done", result={"cost": 1.0})
-    assert not store.finish_job(job, "failed", error={"code": "x", "detail": "y"})
-    assert store.jobs.heartbeat("a").jobs == frozenset()
+    assert not store.finish_job(job, "done", runner="b", result={"cost": 2.0}, file=b"late")
+    assert not store.finish_job(job, "cancelled")
+    assert store.jobs.get(session, job) == kept
+    assert originals(store) == set()
+    assert store.finish_job(job, "done", runner="a", result={"cost": 1.0})
+    assert not store.finish_job(job, "failed", runner="a", error={"code": "x", "detail": "y"})
+    assert store.leases.heartbeat("a").jobs == frozenset()
 
 
 def test_what_is_handed_over_counts_as_no_crash(store, session):
     job = queued(store, session)
     claimed(store, "a")
-    store.jobs.start(job, "a")
-    store.jobs.release("a")
+    store.leases.start(job, "a")
+    store.leases.release("a")
     kept = store.jobs.get(session, job)
     assert (kept.state, kept.runner, kept.started) == ("queued", None, None)
     assert claimed(store, "b") == [job]
@@ -144,7 +147,7 @@ def test_after_a_crash_everything_is_claimable_at_once_with_sqlite(tmp_path):
     session, _ = store.sessions.create(CAR, [])
     running, waiting = queued(store, session), queued(store, session)
     claimed(store, "a")
-    store.jobs.start(running, "a")
+    store.leases.start(running, "a")
     store.close()
     store = Store(tmp_path, Limits())
     assert store.jobs.get(session, running).state == "queued"
@@ -153,8 +156,11 @@ def test_after_a_crash_everything_is_claimable_at_once_with_sqlite(tmp_path):
     store.close()
 
 
-def test_a_job_without_a_runner_is_cancelled_at_once(store, session):
+@pytest.mark.parametrize("state", ["without a runner", "not started"])
+def test_a_job_that_does_not_run_is_cancelled_at_once(store, session, state):
     job = queued(store, session)
+    if state == "not started":
+        claimed(store, "a")
     assert store.jobs.ask_to_cancel(session, job).state == "cancelled"
     assert claimed(store, "a") == []
     assert store.jobs.ask_to_cancel(session, job).state == "cancelled"
@@ -174,8 +180,9 @@ def test_a_job_with_parts_is_left_to_a_runner_to_be_cancelled(store, session):
 def test_a_runner_hears_with_its_heartbeat_what_is_to_stop(store, session):
     stopping, going_on = queued(store, session), queued(store, session)
     claimed(store, "a")
-    assert store.jobs.ask_to_cancel(session, stopping).state == "queued"
-    beat = store.jobs.heartbeat("a")
+    store.leases.start(stopping, "a")
+    assert store.jobs.ask_to_cancel(session, stopping).state == "running"
+    beat = store.leases.heartbeat("a")
     assert (beat.jobs, beat.cancel_asked) == ({stopping, going_on}, {stopping})
 
 
@@ -183,9 +190,10 @@ def test_a_runner_hears_with_its_heartbeat_what_is_to_stop(store, session):
 def test_what_was_asked_to_stop_is_not_run_again(store, session, later, end):
     job = queued(store, session)
     claimed(store, "a")
+    store.leases.start(job, "a")
     store.jobs.ask_to_cancel(session, job)
     if end == "released":
-        store.jobs.release("a")
+        store.leases.release("a")
     later(LEASE + 1)
     assert claimed(store, "b") == []
     kept = store.jobs.get(session, job)

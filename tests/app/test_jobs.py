@@ -1,13 +1,16 @@
 """Jobs as their owner sees them: states, events, cancelling; the cluster is a stand-in."""
 
+import asyncio
 import json
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from functools import partial
 
 import pytest
 from fastapi.testclient import TestClient
-from ridetune.app.errors import Unavailable
+from ridetune.app.errors import NotFound, Unavailable
 from ridetune.app.job_store import JobStore
 from ridetune.app.owner_store import OwnerStore
 from ridetune.app.settings import Limits
@@ -223,11 +226,56 @@ def test_followers_hear_every_change_and_leave_nothing_behind(service, owner, cl
     assert seen[0] == "queued"
     assert "running" in seen
     assert seen[-1] == "done"
-    assert jobs._followers == {}
+    assert jobs._followers.followed == frozenset()
+
+
+def test_one_look_at_the_database_serves_all_followers(service, owner, clusters, monkeypatch):
+    """Of both jobs, once in a while; of the one with news, at once, and of it alone. Whether each
+    may is asked for each."""
+    jobs, ids = service.app.state.services.jobs, [submit(owner)["id"] for _ in range(2)]
+    until(lambda: set(ids) == set(clusters[-1].tasks))
+    standing, looks, asked = JobStore.standing, [], Counter()
+
+    def look(store, some):
+        looks.append(sorted(some))
+        return standing(store, some)
+
+    monkeypatch.setattr(JobStore, "standing", look)
+    monkeypatch.setattr("ridetune.app.followers.POLL_EVERY", 3600.0)
+
+    async def states(followers) -> list[str]:
+        return [found.state for found in await asyncio.gather(*map(anext, followers))]
+
+    async def follow() -> list[list[str]]:
+        followers = [
+            jobs.follow(owner.id, ids[k % 2], partial(asked.update, [k])) for k in range(10)
+        ]
+        seen = [await states(followers)]
+        jobs._followers.wake(ids[0])
+        seen.append(await states(followers[::2]))
+        for one in followers:
+            await one.aclose()
+        return seen
+
+    assert service.portal.call(follow) == [["queued"] * 10, ["queued"] * 5]
+    assert looks == [sorted(ids), ids[:1]]
+    assert asked == {k: 2 - k % 2 for k in range(10)}
+
+
+def test_a_follower_hears_no_more_once_the_job_is_not_theirs(service, owner, clusters):
+    job = submit(owner)["id"]
+    jobs = service.app.state.services.jobs
+
+    async def follow(session: str) -> None:
+        await anext(jobs.follow(session, job))
+
+    service.portal.call(follow, owner.id)
+    with pytest.raises(NotFound):
+        service.portal.call(follow, Visitor(service).id)
 
 
 def test_a_sessions_jobs_are_followed_so_often_at_once(service, owner, clusters, monkeypatch):
-    """Each follower asks the database every second, at the cost of all; it counts to its end."""
+    """For each the database is asked every second, at the cost of all; it counts to its end."""
     job = submit(owner)["id"]
     owner.post(f"/identifications/{job}/cancel")
     jobs, most = service.app.state.services.jobs, Limits().session_events
@@ -251,11 +299,11 @@ def test_a_sessions_jobs_are_followed_so_often_at_once(service, owner, clusters,
 
 def test_followers_wait_for_a_database_that_is_away(service, owner, clusters, monkeypatch):
     """Whether it cannot tell how the job stands or whose it is."""
-    monkeypatch.setattr("ridetune.app.jobs.POLL_EVERY", 0.01)
+    monkeypatch.setattr("ridetune.app.followers.POLL_EVERY", 0.01)
     job = submit(owner)["id"]
     assert owner.post(f"/identifications/{job}/cancel").status_code == 202
     away = [Unavailable("It is away.") for _ in range(4)]
-    opens, get = OwnerStore.opens, JobStore.get
+    opens, standing = OwnerStore.opens, JobStore.standing
 
     def meanwhile(usual, calls):
         """As usual for the request itself, then away, then as usual again."""
@@ -273,7 +321,7 @@ def test_followers_wait_for_a_database_that_is_away(service, owner, clusters, mo
     assert not away
     away = [Unavailable("It is away.")]
     monkeypatch.setattr(OwnerStore, "opens", opens)
-    monkeypatch.setattr(JobStore, "get", meanwhile(get, []))
+    monkeypatch.setattr(JobStore, "standing", meanwhile(standing, [None]))
     assert [told["state"] for _, told in events(owner, job)] == ["cancelled"]
     assert not away
 

@@ -7,12 +7,16 @@ import sqlite3
 from collections.abc import Callable
 
 import pytest
-from ridetune.app.errors import Unavailable
+from ridetune.app.errors import Deleted, Unavailable
+from ridetune.app.recordings import Recordings
 from ridetune.app.settings import Limits, Settings
 from ridetune.app.store import Store
 from sqlalchemy import event, text
 
 from .conftest import Visitor, open_client, short_recording
+from .test_jobs import clusters
+
+__all__ = ["clusters"]
 
 FILE = short_recording()
 
@@ -53,8 +57,8 @@ def test_a_service_outlives_its_database(tmp_path, postgresql, on_postgresql):
                 refused(reply, 503, "database cannot be reached")
             # What threads of their own have to be ready for.
             for write in (
-                lambda: store.jobs.claim("me", 1),
-                lambda: store.jobs.heartbeat("me"),
+                lambda: store.leases.claim("me", 1),
+                lambda: store.leases.heartbeat("me"),
                 lambda: store.finish_job("any", "done", file=b"rows"),
                 lambda: store.keep_part("any", "part", b"rows"),
             ):
@@ -115,11 +119,15 @@ DISKS = {
     "over quota": (errno.EDQUOT, 507, "disk of the service is full"),
     "read-only": (errno.EROFS, 503, "data directory cannot be used"),
     "broken": (errno.EIO, 503, "data directory cannot be used"),
+    "away": (errno.ENOENT, 503, "data directory cannot be used"),
+    "out of files": (errno.EMFILE, 503, "too many files open"),
+    "out of memory": (errno.ENOMEM, 503, "too little memory"),
 }
 PLACES = {
     "flushing": "ridetune.app.data_directory.os.fsync",
     "renaming": "ridetune.app.data_directory.os.replace",
     "reading": "ridetune.app.recordings.NamedTemporaryFile",
+    "starting a reader": "ridetune.engine.formats.child.subprocess.Popen",
     "receiving": "ridetune.app.uploads.SpooledTemporaryFile",
 }
 
@@ -154,6 +162,58 @@ def test_an_original_that_cannot_be_had_is_told(client):
     refused(owner.upload(b"other" + FILE), 503, "data directory cannot be used")
     away.rename(originals)
     assert owner.get(f"/measurements/{kept}/original").content == FILE
+
+
+def test_a_recording_whose_file_alone_is_gone_is_told_by_its_name(client):
+    """Somebody has deleted it; to add it again mends it, since it lies under its SHA-256."""
+    owner, shared = Visitor(client), client.app.state.services
+    kept = owner.upload(FILE, "lap.csv").json()["id"]
+    measurement = shared.store.measurements.get(owner.id, kept)
+    original = shared.store.measurements.original(measurement)
+    original.unlink()
+    for path in ("original", "columns"):
+        reply = owner.get(f"/measurements/{kept}/{path}")
+        assert reply.status_code == 410
+        assert "lap.csv is gone" in reply.json()["detail"]
+        assert "add the recording again" in reply.json()["detail"]
+    original.parent.rmdir()
+    with pytest.raises(Deleted):
+        Recordings(shared.store).run(measurement)
+    assert owner.upload(FILE, "again.csv").status_code == 201
+    assert owner.get(f"/measurements/{kept}/original").content == FILE
+
+
+@pytest.mark.parametrize("how", ["moved", "emptied", "broken"])
+def test_a_recording_on_a_disk_that_is_away_waits_for_it(client, monkeypatch, how):
+    """A broken disk looks to the process that reads the file like a spoilt one."""
+    owner, shared = Visitor(client), client.app.state.services
+    kept = shared.store.measurements.get(owner.id, owner.upload(FILE).json()["id"])
+    originals = shared.store.directory.originals
+    if how == "broken":
+        shared.store.measurements.original(kept).write_bytes(b"\x00 spoilt")
+        monkeypatch.setattr("pathlib.Path.open", raising(errno.EIO))
+    else:
+        originals.rename(originals.with_name("away"))
+    if how == "emptied":
+        originals.mkdir()
+    with pytest.raises(Unavailable, match="data directory cannot be used"):
+        Recordings(shared.store).run(kept)
+
+
+def test_a_job_whose_recording_s_file_is_gone_fails_and_names_it(settings, clusters):
+    """Deleted before a later start of the service took the job up."""
+    with open_client(settings) as service:
+        owner = Visitor(service)
+        shared = service.app.state.services
+        [kept, *_] = shared.store.measurements.of_session(owner.id)
+        original = shared.store.measurements.original(kept)
+        job = owner.submit("identifications", {"runs": [kept.id]})["id"]
+    original.unlink()
+    with open_client(settings) as service:
+        owner.client = service
+        error = owner.wait_for("identifications", job)["error"]
+    assert error["code"] == "deleted"
+    assert error["detail"].startswith(f"{kept.name} is gone from the service's data directory; add")
 
 
 SQLITE = {
@@ -201,13 +261,14 @@ def test_who_was_let_in_stays_so_while_the_database_takes_nothing(settings):
         assert service.get("/api/parameters").status_code == 200
 
 
-def test_a_job_s_files_wait_for_room(tmp_path, database, monkeypatch):
+@pytest.mark.parametrize("disk", DISKS)
+def test_a_job_s_files_wait_for_room(tmp_path, database, monkeypatch, disk):
     """Oracle: the job is as it was, and can be ended once there is room."""
     store = Store(tmp_path, Limits(), database)
     session, _ = store.sessions.create({}, [])
     job, _ = store.jobs.add(session, "test", {"runs": [], "asked": "a fit"}, None)
     with monkeypatch.context() as patch:
-        patch.setattr(PLACES["flushing"], raising(errno.ENOSPC))
+        patch.setattr(PLACES["flushing"], raising(DISKS[disk][0]))
         for keep in (
             lambda: store.keep_part(job.id, "part", b"rows"),
             lambda: store.finish_job(job.id, "done", file=b"rows"),

@@ -86,10 +86,10 @@ def test_every_job_is_claimed_exactly_once(stores):
     def run(runner: str, store: Store) -> list[str]:
         done = []
         while not ended.is_set():
-            for job in store.jobs.claim(runner, 3):
-                assert store.jobs.start(job.id, runner)
-                assert job.id in store.jobs.heartbeat(runner).jobs
-                assert store.finish_job(job.id, "done", result={})
+            for job in store.leases.claim(runner, 3):
+                assert store.leases.start(job.id, runner)
+                assert job.id in store.leases.heartbeat(runner).jobs
+                assert store.finish_job(job.id, "done", runner=runner, result={})
                 done.append(job.id)
         return done
 
@@ -171,7 +171,7 @@ def test_a_session_may_go_while_it_is_added_to(stores):
     """Whoever comes too late is told that it is deleted; nothing is left of it."""
     for turn in range(5):
         session, _ = stores[0].sessions.create(CAR, [recording(b"sample")])
-        job, _ = queued(stores[0], session), stores[1].jobs.claim("me", 1)
+        job, _ = queued(stores[0], session), stores[1].leases.claim("me", 1)
 
         def add(store: Store, session=session) -> None:
             store.measurements.add(session, recording(b"more"))
@@ -180,8 +180,8 @@ def test_a_session_may_go_while_it_is_added_to(stores):
         works = [
             lambda: add(stores[0]),
             lambda: add(stores[1]),
-            lambda job=job: stores[1].finish_job(job, "done", result={}, file=b"made"),
-            lambda: stores[0].jobs.heartbeat("me"),
+            lambda job=job: stores[1].finish_job(job, "done", runner="me", file=b"made"),
+            lambda: stores[0].leases.heartbeat("me"),
             lambda session=session: stores[1].sessions.delete(session),
         ]
         given = at_once(works)
@@ -234,12 +234,13 @@ def test_what_one_service_keeps_the_other_finds(services):
     assert other.owners.opens(session, user=None, token=token)
     assert other.measurements.original(kept).read_bytes() == b"0 1 2"
     job = queued(one, session)
-    assert [found.id for found in one.jobs.claim("one", 1)] == [job]
-    assert other.jobs.claim("other", 1) == []
-    assert other.jobs.ask_to_cancel(session, job).state == "queued"
-    assert one.jobs.heartbeat("one").cancel_asked == {job}
+    assert [found.id for found in one.leases.claim("one", 1)] == [job]
+    assert other.leases.claim("other", 1) == []
+    assert one.leases.start(job, "one")
+    assert other.jobs.ask_to_cancel(session, job).state == "running"
+    assert one.leases.heartbeat("one").cancel_asked == {job}
     other.delete_job(session, job)
-    assert one.jobs.heartbeat("one").jobs == frozenset()
+    assert one.leases.heartbeat("one").jobs == frozenset()
     other.sessions.delete(session)
     assert not one.owners.opens(session, user=None, token=token)
 

@@ -240,8 +240,8 @@ def test_a_final_state_stays(store, session):
     job = queued(store, session)
     assert store.finish_job(job, "cancelled")
     assert not store.finish_job(job, "done", result={"late": True})
-    assert not store.jobs.start(job, "me")
-    assert not store.jobs.requeue(job, "me")
+    assert not store.leases.start(job, "me")
+    assert not store.leases.requeue(job, "me")
     kept = store.jobs.get(session, job)
     assert (kept.state, kept.result) == ("cancelled", None)
 

@@ -74,11 +74,11 @@ def test_a_database_of_an_earlier_version_works_like_any_other(tmp_path, old):
     assert "car 8" in store.mappings.of_session("s1")
     store.setups.change("s1", SetupForm(starts=16))
     assert (store.sessions.get("s1").setup or {})["starts"] == 16
-    claimed = store.jobs.claim("me", 5)
+    claimed = store.leases.claim("me", 5)
     assert [(job.id, job.restarts) for job in claimed] == [("queued", 0), ("running", 1)]
     assert store.keep_part("running", "second", b"half the rows")
-    assert store.finish_job("running", "done", result={}, file=b"all the rows")
-    store.jobs.release("me")
+    assert store.finish_job("running", "done", runner="me", file=b"all the rows")
+    store.leases.release("me")
     store.sessions.delete("s1")
     assert list(store.directory.names()) == []
     store.close()
