@@ -3,7 +3,7 @@
 import json
 import secrets
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,12 +38,19 @@ class SessionStore:
     """All sessions."""
 
     def __init__(
-        self, database: Database, limits: Limits, files: FileStore, measurements: MeasurementStore
+        self,
+        database: Database,
+        limits: Limits,
+        files: FileStore,
+        measurements: MeasurementStore,
+        removed: Callable[[], None],
     ):
+        """removed : called once a session has been deleted"""
         self._database = database
         self._limits = limits
         self._files = files
         self._measurements = measurements
+        self._removed = removed
 
     def create(
         self,
@@ -114,7 +121,9 @@ class SessionStore:
 
     def _set(self, session: str, **values: Any) -> None:
         with self._database.writing() as connection:
-            connection.execute(update(sessions).where(sessions.c.id == session).values(**values))
+            mine = update(sessions).where(sessions.c.id == session)
+            if not connection.execute(mine.values(**values)).rowcount:
+                raise NotFound(GONE)
 
     def delete(self, session: str) -> None:
         """Remove a workspace with all its measurements, jobs and results."""
@@ -123,4 +132,5 @@ class SessionStore:
             mine = select(jobs.c.id).where(jobs.c.session == session).order_by(jobs.c.id)
             connection.execute(mine.with_for_update())
             connection.execute(delete(sessions).where(sessions.c.id == session))
+        self._removed()
         self._files.drop_unreferenced()
