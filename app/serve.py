@@ -33,6 +33,7 @@ def serve(settings: Settings) -> None:
         except StartError:
             store.close()
             raise
+        store.browsers.remove_others(settings.token)
         _invite(settings, store, _address(settings, listener))
         app = create_app(settings, store=store)
         http, websocket = connections(settings.limits)

@@ -55,7 +55,7 @@ class Store:
             self.database, limits, self.files, self.measurements, self.answers.forget
         )
         self.owners = OwnerStore(self.database)
-        self.browsers = BrowserStore(self.database)
+        self.browsers = BrowserStore(self.database, self.answers.forget)
         self.keys = KeyStore(self.database, self.answers.forget)
         if self.database.shared:
             self.directory.sweep(older=RESTING)
