@@ -16,9 +16,9 @@ from .errors import InvalidRequest, OverBudget
 from .excitation import known_manoeuvre
 from .identification_job import UNTOLD, build_problem, done, fitted_recordings, marked_runs
 from .job_store import Job
+from .limits import Limits
 from .recordings import Recordings
 from .schemas import AdviceRequest
-from .settings import Limits
 from .store import Store
 
 

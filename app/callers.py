@@ -9,7 +9,7 @@ from starlette.requests import HTTPConnection
 
 from .buckets import Buckets
 from .errors import Busy
-from .settings import Limits
+from .limits import Limits
 
 IPV6_SITE = 64
 """Bits of an IPv6 address that a caller does not choose."""

@@ -11,8 +11,8 @@ from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from .draining import PROBES
+from .limits import Limits
 from .problems import problem
-from .settings import Limits
 
 RETRY_AFTER = 5
 

@@ -13,10 +13,10 @@ from ..engine.run import Run
 from .errors import Conflict, OverBudget
 from .job_kinds import Kind, digest
 from .job_store import Job
+from .limits import Limits
 from .measurement_store import Measurement
 from .recordings import Recordings, as_stated, with_braking
 from .schemas import IdentificationRequest
-from .settings import Limits
 from .store import Store
 from .worker import Attempt, Task
 

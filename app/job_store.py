@@ -33,8 +33,8 @@ from sqlalchemy import (
 
 from .database import Database
 from .errors import Busy, InvalidRequest, NotFound
+from .limits import Limits
 from .session_row import lock_session, mark_used
-from .settings import Limits
 from .tables import job_files, job_parts, jobs, results
 
 UNFINISHED = ("queued", "running")

@@ -15,8 +15,8 @@ from .database import Database
 from .errors import Busy, Conflict, NotFound
 from .file_store import FileStore
 from .job_store import JobStore
+from .limits import Limits
 from .session_row import lock_session, mark_used
-from .settings import Limits
 from .tables import measurements, uploads
 
 ABSENT = "There is no measurement with that id in this session."

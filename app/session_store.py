@@ -12,10 +12,10 @@ from sqlalchemy import Connection, bindparam, delete, func, insert, select, upda
 from .database import Database
 from .errors import NotFound, Unavailable
 from .file_store import FileStore
+from .limits import Limits
 from .measurement_store import MeasurementStore, NewMeasurement
 from .secret import hashed, new_secret
 from .session_row import GONE
-from .settings import Limits
 from .tables import jobs, sessions
 
 UNUSED_AFTER = 3600.0

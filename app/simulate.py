@@ -23,9 +23,9 @@ from .errors import OverBudget
 from .excitation import excitation_of, extent, mode_of, recording_in, recording_of
 from .identification_job import done
 from .job_store import Job
+from .limits import Limits
 from .recordings import Recordings
 from .schemas import SimulationRequest
-from .settings import Limits
 from .store import Store
 
 USUAL_STEP = 0.0025

@@ -18,13 +18,13 @@ from .errors import NotFound
 from .file_store import FileStore
 from .job_store import JobStore
 from .key_store import KeyStore
+from .limits import Limits
 from .mapping_store import MappingStore
 from .measurement_store import MeasurementStore
 from .owner_store import OwnerStore
 from .postgresql import PostgresqlDatabase
 from .recent_answers import RecentAnswers
 from .session_store import SessionStore
-from .settings import Limits
 from .setup_store import SetupStore
 from .sqlite import SqliteDatabase
 from .storage import files_in_a_sentence

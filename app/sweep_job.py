@@ -13,10 +13,10 @@ from typing import Any
 from .errors import OverBudget
 from .job_kinds import PATIENT, Division, Kind, Progress, digest
 from .job_store import Job
+from .limits import Limits
 from .measurement_store import Measurement
 from .recordings import Recordings, as_stated, stated
 from .schemas import FullFactorialForm, SweepRequest
-from .settings import Limits
 from .store import Store
 from .worker import Attempt, WithFile
 

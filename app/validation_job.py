@@ -13,11 +13,11 @@ from .errors import InvalidRequest
 from .identification_job import check_budget, done, fitted_recordings
 from .job_kinds import Kind
 from .job_store import Job
+from .limits import Limits
 from .measurement_store import Measurement
 from .measurement_view import data_keys
 from .recordings import Recordings, as_stated, stated, with_braking
 from .schemas import ValidationRequest
-from .settings import Limits
 from .store import Store
 from .worker import Attempt, WithFile
 

@@ -27,8 +27,8 @@ from ..engine.vehicle import Vehicle
 from .access import opened_session, session_of
 from .buckets import Buckets
 from .errors import Busy, NotFound, Unavailable
+from .limits import Limits
 from .package_files import package_folder
-from .settings import Limits
 from .viser_servers import ADMISSION, closed_server
 
 FOG = (18, 22, 27)

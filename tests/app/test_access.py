@@ -5,7 +5,8 @@ import re
 import pytest
 from fastapi.testclient import TestClient
 from ridetune.app.addresses import networks
-from ridetune.app.settings import Limits, Settings
+from ridetune.app.limits import Limits
+from ridetune.app.settings import Settings
 from ridetune.app.tables import browsers
 from sqlalchemy import func, select
 

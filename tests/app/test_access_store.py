@@ -4,8 +4,8 @@ import pytest
 from ridetune.app import browser_store, key_store
 from ridetune.app.browser_store import BROWSER_SECONDS, LINK_SECONDS
 from ridetune.app.errors import Conflict, InvalidRequest, NotFound
+from ridetune.app.limits import Limits
 from ridetune.app.secret import hashed
-from ridetune.app.settings import Limits
 from ridetune.app.store import Store, database_beside
 
 CAR = {"name": "a car"}

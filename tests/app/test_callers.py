@@ -5,7 +5,8 @@ from fastapi.testclient import TestClient
 from ridetune.app.buckets import Buckets
 from ridetune.app.callers import Callers, caller_of
 from ridetune.app.errors import Busy
-from ridetune.app.settings import Limits, Settings
+from ridetune.app.limits import Limits
+from ridetune.app.settings import Settings
 from starlette.requests import Request
 
 from .conftest import ADDRESS, Visitor, open_client

@@ -6,7 +6,7 @@ import json
 import pytest
 from ridetune.app.bodies import Body
 from ridetune.app.connection import HEAD_BYTES, connections
-from ridetune.app.settings import Limits
+from ridetune.app.limits import Limits
 from starlette.exceptions import HTTPException
 from uvicorn import Config
 from uvicorn.server import ServerState

@@ -8,7 +8,7 @@ from ridetune.app import dispatcher as module
 from ridetune.app.dispatcher import Dispatcher
 from ridetune.app.errors import Unavailable
 from ridetune.app.job_kinds import PATIENT, Division, Kind
-from ridetune.app.settings import Limits
+from ridetune.app.limits import Limits
 from ridetune.app.store import Store
 from ridetune.app.tables import jobs
 from sqlalchemy import update

@@ -8,7 +8,8 @@ from collections.abc import Callable
 
 import pytest
 from ridetune.app.errors import Unavailable
-from ridetune.app.settings import Limits, Settings
+from ridetune.app.limits import Limits
+from ridetune.app.settings import Settings
 from ridetune.app.store import Store
 from sqlalchemy import event, text
 
