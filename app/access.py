@@ -34,9 +34,14 @@ async def opened_session(connection: HTTPConnection, sid: str) -> str:
     """As `session_of`, asked once in a request, and not of what was answered lately."""
     if getattr(connection.state, "opened", None) != sid:
         token = bearer(connection.headers) or cookies.session_token(connection, sid)
-        await _remembered(connection, sid, token, partial(_owner, connection, sid))
-        connection.state.opened = sid
+        user = await _remembered(connection, sid, token, partial(_owner, connection, sid))
+        connection.state.opened, connection.state.user = sid, user or None
     return sid
+
+
+def user_who_opened(connection: HTTPConnection) -> str | None:
+    """Who calls, where that is known, of a request whose session `opened_session` has opened."""
+    return connection.state.user
 
 
 async def require_visitor(connection: HTTPConnection) -> None:
@@ -53,18 +58,19 @@ async def require_visitor(connection: HTTPConnection) -> None:
 
 async def _remembered(
     connection: HTTPConnection, sid: str, secrets: str, look: Callable[[], str]
-) -> None:
-    """Let pass whom `look` lets pass, or let pass lately with the same secrets and the same word of
-    the proxy, on which it must depend alone; it gives the caller's name, or nothing.
+) -> str:
+    """What `look` answers, or answered lately of the same secrets and the same word of the proxy,
+    on which it must depend alone: the caller's name, or nothing. It raises for who may not pass.
     """
     services = services_of(connection)
     answers = services.store.answers
     question = sid, hashed(secrets), proxy_user(connection.scope, services.settings)
     user = answers.recall(question)
     if user is None:
-        await run_in_threadpool(answers.ask, question, look)
-    elif user:
+        return await run_in_threadpool(answers.ask, question, look)
+    if user:
         logs.tell(user=user)
+    return user
 
 
 def _owner(connection: HTTPConnection, sid: str) -> str:

@@ -27,6 +27,7 @@ class Limits:
     reader_bytes: int = 2 << 30
     reader_seconds: int = 20
     sessions: int = 1000
+    user_sessions: int = 200
     new_sessions: int = 60
     session_measurements: int = 50
     session_bytes: int = 500_000_000
@@ -36,6 +37,7 @@ class Limits:
     session_simulations: int = 4
     waiting_simulations: int = 64
     session_simulated_seconds: float = 200_000.0
+    user_simulated_seconds: float = 1_000_000.0
     viewers: int = 200
     session_viewers: int = 8
     viewer_messages: int = 200

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Request, Response
 from fastapi.responses import JSONResponse, StreamingResponse
 
 from . import frames
-from .access import SessionId
+from .access import SessionId, user_who_opened
 from .errors import InvalidRequest
 from .identification_job import KIND as IDENTIFICATION
 from .schemas import SimulationRequest
@@ -36,11 +36,12 @@ async def simulate(
     """Simulate a manoeuvre, a recording's wheel motion or a rig test."""
     form = frames.form_of(request.headers.get("accept"))
     services.warmup.require()
-    return await services.interactive.run(sid, lambda: _simulated(services, sid, body, form))
+    user = user_who_opened(request)
+    return await services.interactive.run(sid, lambda: _simulated(services, sid, user, body, form))
 
 
 def _simulated(
-    services: Services, sid: str, body: SimulationRequest, form: frames.Form
+    services: Services, sid: str, user: str | None, body: SimulationRequest, form: frames.Form
 ) -> Response:
     from .simulate import plan, reply
 
@@ -50,7 +51,7 @@ def _simulated(
         raise InvalidRequest("Bands come as JSON or frames; ask for one of them.", field="bands")
     store, limits = services.store, services.settings.limits
     task = plan(body, sid, fitted, store, services.recordings, limits)
-    services.callers.simulate(sid, task.seconds)
+    services.callers.simulate(sid, user, task.seconds)
     found = reply(body, task)
     if body.scene and services.viewers is not None:
         services.viewers.show(sid, task.vehicle)

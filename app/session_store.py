@@ -7,10 +7,20 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Connection, bindparam, delete, func, insert, select, update
+from sqlalchemy import (
+    ColumnElement,
+    Connection,
+    bindparam,
+    delete,
+    func,
+    insert,
+    select,
+    true,
+    update,
+)
 
 from .database import Database
-from .errors import NotFound, Unavailable
+from .errors import Busy, NotFound, Unavailable
 from .file_store import FileStore
 from .limits import Limits
 from .measurement_store import MeasurementStore, NewMeasurement
@@ -69,7 +79,7 @@ class SessionStore:
         session, token, now = secrets.token_hex(8), new_secret(), time.time()
         text = json.dumps(vehicle)
         with self._database.writing() as connection:
-            self._make_room(connection, now)
+            self._make_room(connection, now, owner)
             connection.execute(
                 insert(sessions).values(
                     id=session,
@@ -84,15 +94,18 @@ class SessionStore:
             self._measurements.insert(connection, session, samples)
         return session, token
 
-    def _make_room(self, connection: Connection, now: float) -> None:
-        """Let go of workspaces that nobody ever used, if there are too many."""
+    def _make_room(self, connection: Connection, now: float, owner: str | None) -> None:
+        """Let go of workspaces that nobody ever used where there are too many, also of a user's."""
         self._database.lock(connection, {"sessions"})
-        count = select(func.count()).select_from(sessions)
-        if connection.execute(count).scalar_one() < self._limits.sessions:
-            return
-        unused = sessions.c.used.is_(False) & (sessions.c.seen < now - UNUSED_AFTER)
-        connection.execute(delete(sessions).where(unused))
-        if connection.execute(count).scalar_one() >= self._limits.sessions:
+        if owner is not None and not _has_room(
+            connection, now, sessions.c.owner == owner, self._limits.user_sessions
+        ):
+            raise Busy(
+                f"You already keep {self._limits.user_sessions} sessions; delete one that is no "
+                "longer needed, or go on with it. Those that hold nothing of yours make room an "
+                "hour after their last use."
+            )
+        if not _has_room(connection, now, true(), self._limits.sessions):
             raise Unavailable(
                 f"The service already keeps {self._limits.sessions} sessions; delete one that is "
                 "no longer needed, or try again later.",
@@ -135,3 +148,13 @@ class SessionStore:
             connection.execute(delete(sessions).where(sessions.c.id == session))
         self._removed()
         self._files.drop_unreferenced()
+
+
+def _has_room(connection: Connection, now: float, these: ColumnElement[bool], most: int) -> bool:
+    """Whether one more may join these, of which the unused ones go if it must be."""
+    count = select(func.count()).select_from(sessions).where(these)
+    if connection.execute(count).scalar_one() < most:
+        return True
+    unused = sessions.c.used.is_(False) & (sessions.c.seen < now - UNUSED_AFTER)
+    connection.execute(delete(sessions).where(these & unused))
+    return connection.execute(count).scalar_one() < most

@@ -1,9 +1,9 @@
 """Links, browsers, keys and owners as they are kept: what lets in, how long, and by whose word."""
 
 import pytest
-from ridetune.app import browser_store, key_store
+from ridetune.app import browser_store, key_store, session_store
 from ridetune.app.browser_store import BROWSER_SECONDS, LINK_SECONDS
-from ridetune.app.errors import Conflict, InvalidRequest, NotFound
+from ridetune.app.errors import Busy, Conflict, InvalidRequest, NotFound
 from ridetune.app.limits import Limits
 from ridetune.app.secret import hashed
 from ridetune.app.store import Store, database_beside
@@ -185,3 +185,20 @@ def test_everybody_lists_their_own(store):
     assert ids(user="user:anna", tokens=[token]) == [mine, later, anna]
     assert ids(user=None, tokens=[token, "guessed"]) == [mine]
     assert ids(user="user:bert", tokens=[]) == ids(user=None, tokens=[]) == []
+
+
+def test_a_users_unused_sessions_make_room_for_their_own_alone(tmp_path, database, monkeypatch):
+    """After an hour; one that holds something stays, and so does another user's."""
+    store = Store(tmp_path, Limits(user_sessions=2), database)
+    make = lambda who: store.sessions.create(CAR, [], who)[0]  # noqa: E731
+    unused, used, others = make("user:anna"), make("user:anna"), make("user:bert")
+    store.sessions.set_vehicle(used, CAR)
+    with pytest.raises(Busy, match="2 sessions"):
+        make("user:anna")
+    monkeypatch.setattr(session_store, "UNUSED_AFTER", -1.0)
+    third = make("user:anna")
+    of = lambda who: {one.id for one in store.owners.sessions(user=who, tokens=[])}  # noqa: E731
+    assert of("user:anna") == {used, third}
+    assert of("user:bert") == {others}
+    assert unused not in of("user:anna")
+    store.close()
