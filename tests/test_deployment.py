@@ -147,6 +147,26 @@ def test_certificates_are_made_once_and_hold(tmp_path):
     assert (tmp_path / "cluster.key").read_bytes() == key
 
 
+def test_certificates_are_renewed_as_the_documents_say(tmp_path):
+    """The command that removes the former ones, in another folder; then all are new and hold."""
+    text = (ROOT / "docs/operations.md").read_text()
+    [remove] = re.findall(r"docker compose run --rm certificates sh -c '(rm .*)'", text)
+    names = re.findall(r"certificates \w+ (?:\w+ )*ridetune$", text, re.MULTILINE)[0].split()
+    mounting = [name for name, one in COMPOSE["services"].items() if "certificates" in str(one)]
+    assert set(mounting) == set(names)
+    make = [str(DEPLOY / "make-certificates"), str(tmp_path)]
+    subprocess.run(make, check=True, capture_output=True)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    there = remove.replace("/var/lib/ridetune-certificates", str(tmp_path))
+    subprocess.run(["sh", "-c", there], check=True)
+    assert list(tmp_path.iterdir()) == []
+    subprocess.run(make, check=True, capture_output=True)
+    after = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert after.keys() == before.keys()
+    assert not [name for name in after if after[name] == before[name]]
+    shake_hands(tmp_path)
+
+
 def shake_hands(folder: Path) -> None:
     def end(purpose: ssl.Purpose) -> ssl.SSLContext:
         context = ssl.create_default_context(purpose, cafile=str(folder / "authority.pem"))
