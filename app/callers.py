@@ -1,18 +1,15 @@
 """How much one caller may ask for in a time, whatever is under way at the moment."""
 
-import ipaddress
 import math
 import time
 from collections.abc import Callable
 
 from starlette.requests import HTTPConnection
 
+from .addresses import site
 from .buckets import Buckets
 from .errors import Busy
 from .limits import Limits
-
-IPV6_SITE = 64
-"""Bits of an IPv6 address that a caller does not choose."""
 
 
 class Callers:
@@ -66,14 +63,7 @@ def _refuse(wait: float, sentence: str) -> None:
 
 def caller_of(connection: HTTPConnection) -> str:
     """Who calls: the peer's address, of IPv6 its site."""
-    host = connection.client.host if connection.client else ""
-    try:
-        address = ipaddress.ip_address(host)
-    except ValueError:
-        return host
-    if address.version == 6:
-        return str(ipaddress.ip_network((address, IPV6_SITE), strict=False))
-    return host
+    return site(connection.client.host if connection.client else "")
 
 
 def _in_words(seconds: float) -> str:

@@ -18,6 +18,7 @@ class Limits:
     """What one request, one session or the whole service may ask for."""
 
     connections: int = 2000
+    peer_connections: int = 1000
     head_seconds: float = 10.0
     stalled_seconds: float = 60.0
     upload_bytes: int = 100_000_000
