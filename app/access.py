@@ -4,30 +4,89 @@ The token comes as a cookie or as a bearer; it is random, given once, and kept o
 session that is not the caller's looks exactly like one that does not exist.
 """
 
+from collections.abc import Callable
+from functools import partial
 from typing import Annotated
 
-from fastapi import Depends, Request, Response
+from fastapi import Depends, Response
+from starlette.concurrency import run_in_threadpool
 from starlette.requests import HTTPConnection
 
-from . import cookies
+from . import cookies, logs
 from .callers import caller_of
 from .errors import NotFound
 from .login import is_let_in, require_let_in, user_of
 from .origins import bearer
 from .owner_store import OwnSession
+from .proxy_login import proxy_user
 from .samples import sample_project
+from .secret import hashed
 from .services import services_of
 
 
 def session_of(connection: HTTPConnection, sid: str) -> str:
-    """The session's id if it is the caller's; NotFound otherwise."""
-    owners = services_of(connection).store.owners
+    """The session's id if it is the caller's, asked of the database; NotFound otherwise."""
+    _owner(connection, sid)
+    return sid
+
+
+async def opened_session(connection: HTTPConnection, sid: str) -> str:
+    """As `session_of`, asked once in a request, and not of what was answered lately."""
+    if getattr(connection.state, "opened", None) != sid:
+        token = bearer(connection.headers) or cookies.session_token(connection, sid)
+        user = await _remembered(connection, sid, token, partial(_owner, connection, sid))
+        connection.state.opened, connection.state.user = sid, user or None
+    return sid
+
+
+def user_who_opened(connection: HTTPConnection) -> str | None:
+    """Who calls, where that is known, of a request whose session `opened_session` has opened."""
+    return connection.state.user
+
+
+async def require_visitor(connection: HTTPConnection) -> None:
+    """Refuse who neither may use the service nor holds a session of it."""
+    if not getattr(connection.state, "visitor", False):
+        brought = (
+            bearer(connection.headers),
+            cookies.access_secret(connection),
+            *cookies.session_tokens(connection),
+        )
+        await _remembered(connection, "", "\n".join(brought), partial(_visitor, connection))
+        connection.state.visitor = True
+
+
+async def _remembered(
+    connection: HTTPConnection, sid: str, secrets: str, look: Callable[[], str]
+) -> str:
+    """What `look` answers, or answered lately of the same secrets and the same word of the proxy,
+    on which it must depend alone: the caller's name, or nothing. It raises for who may not pass.
+    """
+    services = services_of(connection)
+    answers = services.store.answers
+    question = sid, hashed(secrets), proxy_user(connection.scope, services.settings)
+    user = answers.recall(question)
+    if user is None:
+        return await run_in_threadpool(answers.ask, question, look)
+    if user:
+        logs.tell(user=user)
+    return user
+
+
+def _owner(connection: HTTPConnection, sid: str) -> str:
+    user, owners = user_of(connection), services_of(connection).store.owners
     token = bearer(connection.headers) or cookies.session_token(connection, sid)
-    if not owners.opens(sid, user=user_of(connection), token=token):
+    if not owners.opens(sid, user=user, token=token):
         raise NotFound(
             "There is no such session, or it is not yours; the start page leads to your own."
         )
-    return sid
+    return user or ""
+
+
+def _visitor(connection: HTTPConnection) -> str:
+    if not is_let_in(connection) and not own_sessions(connection):
+        require_let_in(connection)
+    return user_of(connection) or ""
 
 
 def own_sessions(connection: HTTPConnection) -> list[OwnSession]:
@@ -35,12 +94,6 @@ def own_sessions(connection: HTTPConnection) -> list[OwnSession]:
     brought = bearer(connection.headers)
     tokens = [brought] if brought else list(cookies.session_tokens(connection))
     return services_of(connection).store.owners.sessions(user=user_of(connection), tokens=tokens)
-
-
-def require_visitor(request: Request) -> None:
-    """Refuse who neither may use the service nor holds a session of it."""
-    if not is_let_in(request) and not own_sessions(request):
-        require_let_in(request)
 
 
 def give_session(connection: HTTPConnection, response: Response) -> dict[str, str]:
@@ -56,8 +109,4 @@ def give_session(connection: HTTPConnection, response: Response) -> dict[str, st
     return {"id": sid, "token": token}
 
 
-def _session(request: Request, sid: str) -> str:
-    return session_of(request, sid)
-
-
-SessionId = Annotated[str, Depends(_session)]
+SessionId = Annotated[str, Depends(opened_session)]

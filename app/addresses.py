@@ -8,6 +8,8 @@ from .errors import StartError
 
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 
+IPV6_SITE = 64
+"""Bits of an IPv6 address that a caller does not choose."""
 USUAL_PORTS = {"http": 80, "https": 443}
 
 
@@ -68,3 +70,14 @@ def is_in(address: str, listed: tuple[Network, ...]) -> bool:
     if isinstance(found, ipaddress.IPv6Address) and found.ipv4_mapped:
         found = found.ipv4_mapped
     return any(found in network for network in listed)
+
+
+def site(host: str) -> str:
+    """What of an address a caller does not choose: of IPv6 the network."""
+    try:
+        address = ipaddress.ip_address(host)
+    except ValueError:
+        return host
+    if address.version == 6:
+        return str(ipaddress.ip_network((address, IPV6_SITE), strict=False))
+    return host

@@ -16,9 +16,9 @@ from .errors import InvalidRequest, OverBudget
 from .excitation import known_manoeuvre
 from .identification_job import UNTOLD, build_problem, done, marked_runs
 from .job_row import Job
+from .limits import Limits
 from .measurement import Measurement
 from .schemas import AdviceRequest
-from .settings import Limits
 from .simulator import Host
 
 

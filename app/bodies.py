@@ -10,7 +10,7 @@ from collections.abc import Callable
 from starlette.exceptions import HTTPException
 from starlette.types import Message, Receive
 
-from .settings import Limits
+from .limits import Limits
 
 
 class Body:

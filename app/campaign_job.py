@@ -14,9 +14,9 @@ from .campaign_archive import CampaignArchive, archive_of
 from .errors import InvalidRequest, OverBudget
 from .job_kinds import PATIENT, Division, Kind, Progress
 from .job_row import Job
+from .limits import Limits
 from .plants import Known, known_plant
 from .schemas import CampaignRequest
-from .settings import Limits
 from .simulator import Host
 from .worker import Attempt, CutShort, WithFile
 

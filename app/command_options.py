@@ -31,6 +31,16 @@ def link(command: Parser) -> None:
     _add_data(command)
 
 
+def browsers(command: Parser) -> None:
+    actions = command.add_subparsers(metavar="list|remove", dest="action", required=True)
+    command.commands = actions.choices
+    shown = actions.add_parser("list", help="show which browsers are let in")
+    remove = actions.add_parser("remove", help="end browsers")
+    remove.add_argument("ids", metavar="ID", nargs="+", help="as the list shows it")
+    for action in (shown, remove):
+        _add_data(action)
+
+
 def keys(command: Parser) -> None:
     actions = command.add_subparsers(metavar="add|list|remove", dest="action", required=True)
     command.commands = actions.choices

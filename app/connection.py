@@ -10,11 +10,17 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
+from .addresses import Network, is_in, is_loopback, site
 from .draining import PROBES
+from .limits import Limits
 from .problems import problem
-from .settings import Limits
 
 RETRY_AFTER = 5
+ALL = f"The service has as many connections as it takes; try again in {RETRY_AFTER} s."
+PEERS = (
+    "The service has as many connections from where you are as it takes; close some, or try again "
+    f"in {RETRY_AFTER} s."
+)
 
 HEAD_BYTES = 65_536
 """Of a request before its body, but for what comes in one piece with its end."""
@@ -24,9 +30,20 @@ class _Reading:
     """A connection whose peer must read what it asked for."""
 
     limits: Limits
+    proxies: tuple[Network, ...]
     transport: Transport
     loop: Any
+    client: tuple[str, int] | None
+    peer = ""
+    """From where it comes; nothing of what many come through, a proxy or this machine."""
     _stalled: TimerHandle | None = None
+
+    def connection_made(self, transport: Any) -> None:
+        """A peer has connected."""
+        super().connection_made(transport)  # pyright: ignore[reportAttributeAccessIssue]
+        host = self.client[0] if self.client else ""
+        if not (is_loopback(host) or is_in(host, self.proxies)):
+            self.peer = site(host)
 
     def pause_writing(self) -> None:
         """Much waits to be read."""
@@ -59,11 +76,13 @@ class Connection(_Reading, HttpToolsProtocol):
     def connection_made(self, transport: Transport) -> None:
         """A peer has connected."""
         super().connection_made(transport)
-        if len(self.connections) > 2 * self.limits.connections:
+        open, most = len(self.connections), self.limits.connections
+        theirs, most_of_theirs = self._of_peer(), self.limits.peer_connections
+        if open > 2 * most or theirs > 2 * most_of_theirs:
             transport.abort()
-        elif len(self.connections) > self.limits.connections:
+        elif open > most or theirs > most_of_theirs:
             self._surplus = True
-            self.app = _no_room_for_more(self.app)
+            self.app = _no_room_for_more(self.app, PEERS if open <= most else ALL)
         self._await_head()
 
     def data_received(self, data: bytes) -> None:
@@ -91,6 +110,11 @@ class Connection(_Reading, HttpToolsProtocol):
         self._head_came()
         super().connection_lost(exc)
 
+    def _of_peer(self) -> int:
+        if not self.peer:
+            return 0
+        return sum(one.peer == self.peer for one in self.connections)  # pyright: ignore[reportAttributeAccessIssue]
+
     def _busy(self) -> bool:
         return self.cycle is not None and not self.cycle.response_complete
 
@@ -113,19 +137,20 @@ class Socket(_Reading, WebSocketsSansIOProtocol):
     """A websocket."""
 
 
-def connections(limits: Limits) -> tuple[type[Connection], type[Socket]]:
-    """The protocols of a service with these limits."""
-    known = {"limits": limits}
+def connections(
+    limits: Limits, proxies: tuple[Network, ...] = ()
+) -> tuple[type[Connection], type[Socket]]:
+    """The protocols of a service with these limits behind these proxies."""
+    known = {"limits": limits, "proxies": proxies}
     return type("Connection", (Connection,), known), type("Socket", (Socket,), known)
 
 
-def _no_room_for_more(app: ASGIApp) -> ASGIApp:
+def _no_room_for_more(app: ASGIApp, sentence: str) -> ASGIApp:
     async def refuse(scope: Scope, receive: Receive, send: Send) -> None:
         if scope["path"] in PROBES:
             await app(scope, receive, send)
             return
         headers = {"Retry-After": str(RETRY_AFTER), "Connection": "close"}
-        sentence = "The service has as many connections as it takes; try again in a moment."
         await problem(503, "unavailable", sentence, headers=headers)(scope, receive, send)
 
     return refuse

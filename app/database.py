@@ -119,9 +119,12 @@ def _make_schema(connection: Connection) -> None:
         connection.execute(insert(schema_version).values(version=SCHEMA_VERSION))
     version = connection.execute(select(schema_version.c.version)).scalar_one()
     if 1 <= version < SCHEMA_VERSION:
+        lacking = metadata.tables.keys() - set(inspect(connection).get_table_names())
         metadata.create_all(connection)
         for statement in chain.from_iterable(MIGRATIONS[version - 1 :]):
-            connection.exec_driver_sql(statement)
+            # What has just been made whole (ALTER TABLE name ...) has its new columns.
+            if statement.split()[2] not in lacking:
+                connection.exec_driver_sql(statement)
         connection.execute(update(schema_version).values(version=SCHEMA_VERSION))
     if version <= SCHEMA_VERSION and not connection.execute(select(database_identity.c.id)).all():
         connection.execute(insert(database_identity).values(id=secrets.token_hex(16)))

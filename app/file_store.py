@@ -16,7 +16,7 @@ from sqlalchemy import Connection, delete, exists, func, insert, select
 from .data_directory import DataDirectory
 from .database import Database
 from .errors import Busy, Unavailable
-from .settings import Limits
+from .limits import Limits
 from .storage import OUT_OF_ORDER, files_in_a_sentence
 from .tables import job_files, job_parts, jobs, mappings, measurements, uploads
 

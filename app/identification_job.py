@@ -13,11 +13,11 @@ from ..engine.run import Run
 from .errors import Conflict, OverBudget
 from .job_kinds import Kind, digest
 from .job_row import Job
+from .limits import Limits
 from .measurement import Measurement
 from .recordings import Recordings, as_stated
 from .runs import Runs, with_braking
 from .schemas import IdentificationRequest
-from .settings import Limits
 from .simulator import Host
 from .store import Store
 from .worker import Attempt, Task

@@ -24,7 +24,7 @@ PROBLEMS = {
     413: "The body is over the limit.",
     415: "The body is not sent as JSON.",
     422: "A field is missing, unknown or out of range, or the engine refuses what is said.",
-    429: "Too much of the session's is under way, or kept; Retry-After may say when to try again.",
+    429: "Too much of a session or caller is under way, or kept; Retry-After may say till when.",
     503: "The service cannot do this just now; Retry-After says when to try again.",
     507: "The disk of the service is full; nothing was kept.",
 }
@@ -52,6 +52,7 @@ ALSO: dict[str, tuple[int, ...]] = {
     "mappings_set_mapping": READING,
     "mappings_forget_mapping": READING,
     "mappings_keep_mapping": (429,),
+    "sessions_create": (429,),
     "sessions_change_setup": (429,),
     "sweeps_cars": (409,),
     "validations_result": (409,),

@@ -10,8 +10,8 @@ from sqlalchemy import Connection, Row, delete, func, insert, select, update
 from .database import Database
 from .errors import Busy, InvalidRequest, NotFound
 from .job_row import UNFINISHED, Job, cancel_in, job_of, select_jobs, to_cancel
+from .limits import Limits
 from .session_row import lock_session, mark_used
-from .settings import Limits
 from .tables import job_files, job_parts, jobs, results
 
 

@@ -1,6 +1,7 @@
 """API keys of programs: shown once, kept as hashes, ended by removing them."""
 
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -31,8 +32,10 @@ class Key:
 class KeyStore:
     """The keys, each by its name."""
 
-    def __init__(self, database: Database):
+    def __init__(self, database: Database, removed: Callable[[], None] = lambda: None):
+        """removed : called once a key has been ended"""
         self._database = database
+        self._removed = removed
 
     def add(self, name: str) -> str:
         """A new key, which cannot be shown again."""
@@ -64,6 +67,7 @@ class KeyStore:
             gone = connection.execute(delete(keys).where(keys.c.name == name)).rowcount
         if not gone:
             raise NotFound(f"There is no key {name!r}; `ridetune keys list` shows those there are.")
+        self._removed()
 
     def any(self) -> bool:
         """Whether there is a key."""

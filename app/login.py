@@ -39,7 +39,7 @@ def is_let_in(connection: HTTPConnection) -> bool:
     if brought := bearer(connection.headers):
         return _is_service_token(connection, brought)
     secret = cookies.access_secret(connection)
-    return bool(secret) and services.store.browsers.knows(secret)
+    return bool(secret) and services.store.browsers.knows(secret, services.settings.token)
 
 
 def brings_secret(connection: HTTPConnection) -> bool:
@@ -67,7 +67,8 @@ def let_in(connection: HTTPConnection, response: Response, token: str) -> bool:
     if not is_let_in(connection):
         if known:  # which, unlike a link, can be brought as often as one likes
             services.callers.let_in(caller_of(connection))
-        cookies.give_access(connection, response, browsers.let_in())
+        secret = browsers.let_in(services.settings.token if known else "")
+        cookies.give_access(connection, response, secret)
     return True
 
 

@@ -41,6 +41,7 @@ from .identification_job import KIND as IDENTIFICATION
 from .identification_job import identify_runs, of_recordings
 from .interface import describe, operation_id
 from .jobs import Jobs
+from .limits import Limits
 from .metrics import Metrics
 from .observed import Observed
 from .package_files import package_folder
@@ -52,7 +53,7 @@ from .readiness import Readiness
 from .recordings import Recordings
 from .services import Services, Viewers
 from .services_metrics import ServicesCollector
-from .settings import Limits, Settings
+from .settings import Settings
 from .simulators import Simulators
 from .store import Store
 from .sweep_job import KIND as SWEEP

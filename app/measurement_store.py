@@ -14,9 +14,9 @@ from .database import Database
 from .errors import Busy, Conflict, Deleted, NotFound, Unavailable
 from .file_store import FileStore
 from .job_store import JobStore
+from .limits import Limits
 from .measurement import Measurement, NewMeasurement
 from .session_row import lock_session, mark_used
-from .settings import Limits
 from .storage import OUT_OF_ORDER, files_in_a_sentence
 from .tables import measurements, uploads
 

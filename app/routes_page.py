@@ -4,10 +4,9 @@ from urllib.parse import urlencode
 
 from fastapi import APIRouter, Request
 from fastapi.responses import FileResponse, RedirectResponse, Response
-from starlette.concurrency import run_in_threadpool
 
 from . import cookies, messages
-from .access import give_session, own_sessions, session_of
+from .access import give_session, opened_session, own_sessions
 from .errors import NotFound
 from .login import is_let_in, let_in
 from .package_files import package_folder
@@ -44,7 +43,7 @@ async def page(sid: str, request: Request) -> Response:
     if _came_from_elsewhere(request):
         return messages.knock_again(request)
     try:
-        await run_in_threadpool(session_of, request, sid)
+        await opened_session(request, sid)
     except NotFound:
         return messages.no_such_session()
     response = FileResponse(package_folder("static") / "index.html")

@@ -1,9 +1,14 @@
-"""Sessions: one visitor's car, its baseline, measurements, identifications and sweeps."""
+"""Sessions: one visitor's car, its baseline, measurements, identifications and sweeps.
+
+What is asked for most goes to a thread once; of a handler that is not asynchronous FastAPI sends
+the reply's check to a second one.
+"""
 
 from dataclasses import asdict
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Request, Response
+from starlette.concurrency import run_in_threadpool
 
 from ..engine.vehicle_file import vehicle_from_json, vehicle_to_json
 from . import cookies
@@ -64,9 +69,9 @@ def delete(request: Request, sid: SessionId, services: Shared, response: Respons
 
 
 @router.get("/{sid}/vehicle")
-def vehicle(sid: SessionId, services: Shared) -> dict[str, Any]:
+async def vehicle(sid: SessionId, services: Shared) -> dict[str, Any]:
     """The car being tuned."""
-    return services.store.sessions.get(sid).vehicle
+    return (await run_in_threadpool(services.store.sessions.get, sid)).vehicle
 
 
 @router.put("/{sid}/vehicle")
@@ -78,9 +83,9 @@ def set_vehicle(sid: SessionId, services: Shared, body: VehicleBody) -> dict[str
 
 
 @router.get("/{sid}/baseline")
-def baseline(sid: SessionId, services: Shared) -> dict[str, Any]:
+async def baseline(sid: SessionId, services: Shared) -> dict[str, Any]:
     """The car it is compared with."""
-    return services.store.sessions.get(sid).baseline
+    return (await run_in_threadpool(services.store.sessions.get, sid)).baseline
 
 
 @router.put("/{sid}/baseline")
@@ -92,9 +97,9 @@ def set_baseline(sid: SessionId, services: Shared, body: VehicleBody) -> dict[st
 
 
 @router.get("/{sid}/setup")
-def setup(sid: SessionId, services: Shared) -> dict[str, Any] | None:
+async def setup(sid: SessionId, services: Shared) -> dict[str, Any] | None:
     """What the page will ask of the next identification; null while nothing was chosen."""
-    return services.store.sessions.get(sid).setup
+    return (await run_in_threadpool(services.store.sessions.get, sid)).setup
 
 
 @router.patch("/{sid}/setup")

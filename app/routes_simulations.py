@@ -7,7 +7,7 @@ from fastapi import APIRouter, Request, Response
 from fastapi.responses import StreamingResponse
 
 from . import frames
-from .access import SessionId
+from .access import SessionId, user_who_opened
 from .excitation_mode import mode_of, recording_of
 from .identification_job import KIND as IDENTIFICATION
 from .identification_job import done
@@ -38,11 +38,12 @@ async def simulate(
     """Simulate a manoeuvre, a recording's wheel motion or a rig test."""
     form = frames.form_of(request.headers.get("accept"))
     services.warmup.require()
-    return await services.interactive.run(sid, lambda: _simulated(services, sid, body, form))
+    user = user_who_opened(request)
+    return await services.interactive.run(sid, lambda: _simulated(services, sid, user, body, form))
 
 
 def _simulated(
-    services: Services, sid: str, body: SimulationRequest, form: frames.Form
+    services: Services, sid: str, user: str | None, body: SimulationRequest, form: frames.Form
 ) -> Response:
     mode_of(body)
     fit = None
@@ -58,7 +59,7 @@ def _simulated(
         recording_of(body, sid, store),
         fit,
         services.settings.limits,
-        charge=lambda seconds: services.callers.simulate(sid, seconds),
+        charge=lambda seconds: services.callers.simulate(sid, user, seconds),
     )
     if shown is not None and services.viewers is not None:
         services.viewers.show(sid, shown)

@@ -51,6 +51,8 @@ Highpass = Annotated[Number, Field(ge=LOWEST_HIGHPASS, le=HIGHEST_HIGHPASS)] | N
 RimsStep = Annotated[Number, Field(ge=rims_settings.SHORTEST_STEP, le=rims_settings.LONGEST_STEP)]
 Intervals = Annotated[list[tuple[Number, Number]], Field(max_length=100)]
 RIMS = RimsSettings()
+SHORTEST_PREVIEW = 0.01
+"""Of a road, m."""
 
 
 def _key_or_object(value: Any) -> Any:
@@ -259,7 +261,7 @@ class RoadPreview(WireForm):
     """A road as a manoeuvre would build it, seen from above the car at rest."""
 
     road: JsonObject
-    length: Annotated[Number, Field(gt=0, le=20_000)] = 200.0
+    length: Annotated[Number, Field(ge=SHORTEST_PREVIEW, le=20_000)] = 200.0
     torque_end: Annotated[Number, Field(ge=0, le=20_000)] = 100.0
     seed: Seed = 0
     points: Annotated[Whole, Field(ge=2, le=20_000)] = 2000

@@ -1,7 +1,8 @@
-"""Random secrets, of which only the hash is kept."""
+"""Secrets, of which only a hash is kept."""
 
 import hashlib
 import secrets
+from functools import cache
 
 
 def new_secret() -> str:
@@ -12,3 +13,11 @@ def new_secret() -> str:
 def hashed(secret: str) -> str:
     """What is kept of a secret. It is random and long, so one plain hash hides it."""
     return hashlib.sha256(secret.encode(errors="replace")).hexdigest()
+
+
+@cache
+def marked(token: str, salt: str) -> str:
+    """What tells a token that a person chose from others. It may be short, so it is hashed slowly,
+    and elsewhere in another way.
+    """
+    return hashlib.scrypt(token.encode(), salt=salt.encode(), n=2**14, r=8, p=1, dklen=32).hex()

@@ -30,9 +30,10 @@ def serve(settings: Settings) -> None:
         except StartError:
             store.close()
             raise
+        store.browsers.remove_others(settings.token)
         _invite(settings, store, _address(settings, listener))
         app = create_app(settings, store=store)
-        http, websocket = connections(settings.limits)
+        http, websocket = connections(settings.limits, settings.proxy_addresses)
         config = uvicorn.Config(
             app,
             http=http,

@@ -3,23 +3,38 @@
 import json
 import secrets
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Connection, delete, func, insert, select, update
+from sqlalchemy import (
+    ColumnElement,
+    Connection,
+    bindparam,
+    delete,
+    func,
+    insert,
+    select,
+    true,
+    update,
+)
 
 from .database import Database
-from .errors import NotFound, Unavailable
+from .errors import Busy, NotFound, Unavailable
 from .file_store import FileStore
+from .limits import Limits
 from .measurement import NewMeasurement
 from .measurement_store import MeasurementStore
 from .secret import hashed, new_secret
 from .session_row import GONE
-from .settings import Limits
 from .tables import jobs, sessions
 
 UNUSED_AFTER = 3600.0
+
+# Made once: to make it takes as long as to execute it.
+_KEPT = select(sessions.c.vehicle, sessions.c.baseline, sessions.c.setup).where(
+    sessions.c.id == bindparam("session")
+)
 
 
 @dataclass(frozen=True)
@@ -39,12 +54,19 @@ class SessionStore:
     """All sessions."""
 
     def __init__(
-        self, database: Database, limits: Limits, files: FileStore, measurements: MeasurementStore
+        self,
+        database: Database,
+        limits: Limits,
+        files: FileStore,
+        measurements: MeasurementStore,
+        removed: Callable[[], None],
     ):
+        """removed : called once a session has been deleted"""
         self._database = database
         self._limits = limits
         self._files = files
         self._measurements = measurements
+        self._removed = removed
 
     def create(
         self,
@@ -58,7 +80,7 @@ class SessionStore:
         session, token, now = secrets.token_hex(8), new_secret(), time.time()
         text = json.dumps(vehicle)
         with self._database.writing() as connection:
-            self._make_room(connection, now)
+            self._make_room(connection, now, owner)
             connection.execute(
                 insert(sessions).values(
                     id=session,
@@ -73,15 +95,18 @@ class SessionStore:
             self._measurements.insert(connection, session, samples)
         return session, token
 
-    def _make_room(self, connection: Connection, now: float) -> None:
-        """Let go of workspaces that nobody ever used, if there are too many."""
+    def _make_room(self, connection: Connection, now: float, owner: str | None) -> None:
+        """Let go of workspaces that nobody ever used where there are too many, also of a user's."""
         self._database.lock(connection, {"sessions"})
-        count = select(func.count()).select_from(sessions)
-        if connection.execute(count).scalar_one() < self._limits.sessions:
-            return
-        unused = sessions.c.used.is_(False) & (sessions.c.seen < now - UNUSED_AFTER)
-        connection.execute(delete(sessions).where(unused))
-        if connection.execute(count).scalar_one() >= self._limits.sessions:
+        if owner is not None and not _has_room(
+            connection, now, sessions.c.owner == owner, self._limits.user_sessions
+        ):
+            raise Busy(
+                f"You already keep {self._limits.user_sessions} sessions; delete one that is no "
+                "longer needed, or go on with it. Those that hold nothing of yours make room an "
+                "hour after their last use."
+            )
+        if not _has_room(connection, now, true(), self._limits.sessions):
             raise Unavailable(
                 f"The service already keeps {self._limits.sessions} sessions; delete one that is "
                 "no longer needed, or try again later.",
@@ -91,11 +116,7 @@ class SessionStore:
     def get(self, session: str) -> Session:
         """The workspace."""
         with self._database.reading() as connection:
-            row = connection.execute(
-                select(sessions.c.vehicle, sessions.c.baseline, sessions.c.setup).where(
-                    sessions.c.id == session
-                )
-            ).one_or_none()
+            row = connection.execute(_KEPT, {"session": session}).one_or_none()
         if row is None:
             raise NotFound(GONE)
         return Session(
@@ -115,7 +136,9 @@ class SessionStore:
 
     def _set(self, session: str, **values: Any) -> None:
         with self._database.writing() as connection:
-            connection.execute(update(sessions).where(sessions.c.id == session).values(**values))
+            mine = update(sessions).where(sessions.c.id == session)
+            if not connection.execute(mine.values(**values)).rowcount:
+                raise NotFound(GONE)
 
     def delete(self, session: str) -> None:
         """Remove a workspace with all its measurements, jobs and results."""
@@ -124,4 +147,15 @@ class SessionStore:
             mine = select(jobs.c.id).where(jobs.c.session == session).order_by(jobs.c.id)
             connection.execute(mine.with_for_update())
             connection.execute(delete(sessions).where(sessions.c.id == session))
+        self._removed()
         self._files.drop_unreferenced()
+
+
+def _has_room(connection: Connection, now: float, these: ColumnElement[bool], most: int) -> bool:
+    """Whether one more may join these, of which the unused ones go if it must be."""
+    count = select(func.count()).select_from(sessions).where(these)
+    if connection.execute(count).scalar_one() < most:
+        return True
+    unused = sessions.c.used.is_(False) & (sessions.c.seen < now - UNUSED_AFTER)
+    connection.execute(delete(sessions).where(these & unused))
+    return connection.execute(count).scalar_one() < most

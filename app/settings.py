@@ -1,14 +1,8 @@
 """What the service is told from outside: where its data lives, where it listens, how much it takes.
 
-Every setting has an environment variable: RIDETUNE_DATA, RIDETUNE_HOST, RIDETUNE_PORT,
-RIDETUNE_LOGIN, RIDETUNE_TOKEN, RIDETUNE_PUBLIC_URL, RIDETUNE_PROXY_USER_HEADER,
-RIDETUNE_PROXY_ADDRESSES and RIDETUNE_ALLOWED_HOSTS (comma separated), RIDETUNE_CLUSTER with
-RIDETUNE_CLUSTER_CA, RIDETUNE_CLUSTER_CERT and RIDETUNE_CLUSTER_KEY, RIDETUNE_DATABASE,
-RIDETUNE_GRACE, RIDETUNE_NOTICE, RIDETUNE_LOG, RIDETUNE_LOG_LEVEL, and for each limit
-RIDETUNE_LIMIT_ followed by its name in capitals.
+Every setting has an environment variable, and what is named like one but is none is refused.
 """
 
-import dataclasses
 import math
 import os
 from collections.abc import Mapping
@@ -16,58 +10,40 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 from urllib.parse import quote, urlsplit
 
 from . import logs
 from .addresses import Network, in_brackets, is_loopback, networks, origin, without_port
 from .errors import StartError
+from .limits import LIMITS, Limits
 
-LIMIT = "RIDETUNE_LIMIT_"
+OURS = "RIDETUNE_"
+NAMES = (
+    "HOST",
+    "PORT",
+    "DATA",
+    "LOGIN",
+    "TOKEN",
+    "PUBLIC_URL",
+    "PROXY_USER_HEADER",
+    "PROXY_ADDRESSES",
+    "ALLOWED_HOSTS",
+    "CLUSTER",
+    "CLUSTER_CA",
+    "CLUSTER_CERT",
+    "CLUSTER_KEY",
+    "DATABASE",
+    "CACHE",  # read by the engine
+    "GRACE",
+    "NOTICE",
+    "LOG",
+    "LOG_LEVEL",
+)
+VARIABLES = (*(OURS + name for name in NAMES), *LIMITS)
+"""All there are."""
 
 Choice = TypeVar("Choice", bound=str)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Limits:
-    """What one request, one session or the whole service may ask for."""
-
-    connections: int = 2000
-    head_seconds: float = 10.0
-    stalled_seconds: float = 60.0
-    upload_bytes: int = 100_000_000
-    body_bytes: int = 4_000_000
-    body_seconds: float = 20.0
-    body_rate: int = 10_000
-    reader_bytes: int = 2 << 30
-    reader_seconds: int = 20
-    sessions: int = 1000
-    new_sessions: int = 60
-    session_measurements: int = 50
-    session_bytes: int = 500_000_000
-    session_jobs: int = 200
-    unfinished_jobs: int = 4
-    session_events: int = 40
-    session_simulations: int = 4
-    waiting_simulations: int = 64
-    session_simulated_seconds: float = 200_000.0
-    viewers: int = 200
-    session_viewers: int = 8
-    viewer_messages: int = 200
-    viewer_message_bytes: int = 256_000
-    readers: int = 2
-    session_readings: int = 16
-    waiting_readings: int = 64
-    simulated_seconds: float = 600.0
-    simulated_steps: int = 400_000
-    banded_steps: int = 2_000_000
-    identified_samples: int = 400_000
-    advised_seconds: float = 1000.0
-    swept_cars: int = 100_000
-    swept_steps: int = 2_000_000_000
-    driven_seconds: float = 600.0
-    long_driven_seconds: float = 200.0
-    unwatched_seconds: float = 600.0
 
 
 @dataclass(frozen=True)
@@ -127,6 +103,7 @@ class Settings:
         environment: Mapping[str, str] = os.environ,
     ) -> "Settings":
         """Settings from the environment; an argument that is not None goes before it."""
+        _check_names(environment)
         allowed = environment.get("RIDETUNE_ALLOWED_HOSTS", "")
         cluster = environment.get("RIDETUNE_CLUSTER", "")
         return cls(
@@ -146,7 +123,7 @@ class Settings:
             notice=_seconds("RIDETUNE_NOTICE", environment, cls.notice),
             log=_one_of(logs.FORMS, logs.FORM, environment, cls.log),
             log_level=_one_of(logs.LEVELS, logs.LEVEL, environment, cls.log_level),
-            limits=_limits(environment),
+            limits=Limits.from_environment(environment),
         )
 
     def check_bind(self, *, keys: bool = False) -> None:
@@ -189,6 +166,17 @@ class Settings:
         public = (without_port(urlsplit(self.public_url).netloc),) if self.public_url else ()
         names = ("localhost", "127.0.0.1", "[::1]", *own, *public, *self.allowed_hosts)
         return frozenset(name.lower() for name in names)
+
+
+def _check_names(environment: Mapping[str, str]) -> None:
+    """Refuse what is misspelt, which would leave a default in its place."""
+    for variable in sorted(name for name in environment if name.startswith(OURS)):
+        if variable not in VARIABLES:
+            names = [*NAMES, *(limit.removeprefix(OURS) for limit in LIMITS)]
+            near = get_close_matches(variable.removeprefix(OURS), names, n=1)
+            known = f"known are {', '.join(OURS + name for name in NAMES)}, and one for each limit."
+            hint = f"did you mean {OURS}{near[0]}?" if near else known
+            raise StartError(f"There is no setting {variable}; {hint}")
 
 
 def _host_names(text: str) -> tuple[str, ...]:
@@ -268,25 +256,3 @@ def _seconds(variable: str, environment: Mapping[str, str], default: float) -> f
         if 0 <= (seconds := float(text or default)) < math.inf:
             return seconds
     raise StartError(f"{variable} is {text!r}; give a number of seconds, 0 or more.")
-
-
-def _limits(environment: Mapping[str, str]) -> Limits:
-    known = {f"{LIMIT}{limit.name.upper()}": limit for limit in dataclasses.fields(Limits)}
-    stated = {}
-    for variable in sorted(name for name in environment if name.startswith(LIMIT)):
-        if variable not in known:
-            near = get_close_matches(variable, known, n=1)
-            hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}."
-            raise StartError(f"There is no limit {variable}; {hint}")
-        limit, text = known[variable], environment[variable]
-        stated[limit.name] = _positive(variable, text, type(limit.default))
-    return Limits(**stated)
-
-
-def _positive(variable: str, text: str, kind: Any) -> int | float:
-    """A finite number above 0 of the limit's kind."""
-    with suppress(ValueError):
-        if 0 < (number := kind(text)) < math.inf:
-            return number
-    what = "whole number" if kind is int else "number"
-    raise StartError(f"{variable} is {text!r}; give a {what} above 0.")

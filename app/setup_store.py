@@ -12,8 +12,8 @@ from sqlalchemy import select, update
 
 from .database import Database
 from .errors import InvalidRequest
+from .limits import Limits
 from .session_row import lock_session
-from .settings import Limits
 from .setup_form import SetupForm
 from .tables import measurements, sessions
 

@@ -21,9 +21,9 @@ from . import frames
 from .errors import InvalidRequest, OverBudget
 from .excitation import excitation_of, extent, recording_in
 from .lent_recordings import LentRecordings
+from .limits import Limits
 from .measurement import Measurement
 from .schemas import SimulationRequest
-from .settings import Limits
 from .simulator import Host
 
 if TYPE_CHECKING:

@@ -19,12 +19,13 @@ from .file_store import FileStore
 from .job_leases import JobLeases
 from .job_store import JobStore
 from .key_store import KeyStore
+from .limits import Limits
 from .mapping_store import MappingStore
 from .measurement_store import MeasurementStore
 from .owner_store import OwnerStore
 from .postgresql import PostgresqlDatabase
+from .recent_answers import RecentAnswers
 from .session_store import SessionStore
-from .settings import Limits
 from .setup_store import SetupStore
 from .sqlite import SqliteDatabase
 from .storage import files_in_a_sentence
@@ -51,10 +52,13 @@ class Store:
         self.measurements = MeasurementStore(
             self.database, self.directory, limits, self.files, self.jobs
         )
-        self.sessions = SessionStore(self.database, limits, self.files, self.measurements)
+        self.answers = RecentAnswers()
+        self.sessions = SessionStore(
+            self.database, limits, self.files, self.measurements, self.answers.forget
+        )
         self.owners = OwnerStore(self.database)
-        self.browsers = BrowserStore(self.database)
-        self.keys = KeyStore(self.database)
+        self.browsers = BrowserStore(self.database, self.answers.forget)
+        self.keys = KeyStore(self.database, self.answers.forget)
         if self.database.shared:
             self.directory.sweep(older=RESTING)
         else:

@@ -15,7 +15,7 @@ from fastapi import HTTPException, Request, Response
 from fastapi.routing import APIRoute
 from starlette.concurrency import run_in_threadpool
 
-from .access import require_visitor, session_of
+from .access import opened_session, require_visitor
 
 DEEPEST = 40
 LONGEST_INTEGER = 30
@@ -36,7 +36,7 @@ class StrictRoute(APIRoute):
             request = StrictRequest(request.scope, request.receive)
             if self.body_field is not None:
                 # FastAPI reads a body before it asks who sends it, and a large one takes long.
-                await run_in_threadpool(_require_owner, request)
+                await _require_owner(request)
                 if not await request.body():
                     raise HTTPException(400, "The body is empty; send JSON.")
             return await handler(request)
@@ -44,13 +44,13 @@ class StrictRoute(APIRoute):
         return strict
 
 
-def _require_owner(request: Request) -> None:
+async def _require_owner(request: Request) -> None:
     """Refuse whose body need not be read."""
     sid = request.path_params.get("sid")
     if sid is None:
-        require_visitor(request)
+        await require_visitor(request)
     else:
-        session_of(request, sid)
+        await opened_session(request, sid)
 
 
 class StrictRequest(Request):

@@ -14,10 +14,10 @@ from .errors import OverBudget
 from .excitation_mode import mode_of
 from .job_kinds import PATIENT, Division, Kind, Progress, digest
 from .job_row import Job
+from .limits import Limits
 from .measurement import Measurement, stated
 from .recordings import Recordings, as_stated
 from .schemas import FullFactorialForm, SweepRequest
-from .settings import Limits
 from .simulator import Host
 from .store import Store
 from .worker import Attempt, WithFile

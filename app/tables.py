@@ -40,6 +40,7 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         "CREATE INDEX sessions_of_owner ON sessions (owner)",
         "CREATE INDEX sessions_by_token ON sessions (token_hash)",
     ),
+    ("ALTER TABLE browsers ADD COLUMN token_mark VARCHAR(64)",),
 )
 """What leads from each version of the schema, the first being 1, to the next."""
 
@@ -85,6 +86,7 @@ browsers = Table(
     Column("hash", String(64), primary_key=True),
     Column("created", Float, nullable=False),
     Column("expires", Float, nullable=False),
+    Column("token_mark", String(64)),  # of the service's token; null: by a link
 )
 
 keys = Table(

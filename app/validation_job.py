@@ -13,11 +13,11 @@ from .errors import InvalidRequest
 from .identification_job import check_budget, done, marked_runs
 from .job_kinds import Kind
 from .job_row import Job
+from .limits import Limits
 from .measurement import Measurement, stated
 from .measurement_view import data_keys
 from .recordings import Recordings, as_stated
 from .schemas import ValidationRequest
-from .settings import Limits
 from .simulator import Host
 from .store import Store
 from .worker import Attempt, WithFile

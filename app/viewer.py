@@ -16,7 +16,7 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter, Depends
 from fastapi.responses import HTMLResponse
 from starlette.concurrency import run_in_threadpool
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -24,11 +24,11 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, WebSocketException
 
 from ..engine.vehicle import Vehicle
-from .access import session_of
+from .access import opened_session, session_of
 from .buckets import Buckets
 from .errors import Busy, NotFound, Unavailable
+from .limits import Limits
 from .package_files import package_folder
-from .settings import Limits
 from .viser_servers import ADMISSION, closed_server
 
 FOG = (18, 22, 27)
@@ -172,9 +172,8 @@ def _client_page() -> str:
     return page.read_text(encoding="utf-8")
 
 
-@router.get("/s/{sid}/viewer/", include_in_schema=False)
-def page(request: Request, sid: str) -> HTMLResponse:
-    session_of(request, sid)
+@router.get("/s/{sid}/viewer/", include_in_schema=False, dependencies=[Depends(opened_session)])
+def page() -> HTMLResponse:
     static = package_folder("static")
     bridge = (static / "bridge.js").read_text(encoding="utf-8")
     style = (static / "bridge.css").read_text(encoding="utf-8")

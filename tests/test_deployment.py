@@ -11,7 +11,7 @@ import yaml
 from distributed.cli import dask_scheduler, dask_worker
 from ridetune.app.cluster import CONFIGURATION
 from ridetune.app.origins import refusal
-from ridetune.app.settings import Settings
+from ridetune.app.settings import VARIABLES, Settings
 
 ROOT = Path(__file__).parents[1]
 DEPLOY = ROOT / "docs" / "deploy"
@@ -32,6 +32,10 @@ class Asked(dict):
         self.names.add(name)
         return default
 
+    def __contains__(self, name):
+        self.names.add(name)
+        return False
+
 
 def copied() -> list[str]:
     """What the image is made of, as paths in the checkout."""
@@ -39,11 +43,16 @@ def copied() -> list[str]:
     return [source for line in lines for source in line.split()[:-1]]
 
 
-@pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)
-def test_every_variable_is_a_setting(file):
+def test_every_variable_is_read():
+    """Those that the service knows by name, so that it refuses all others."""
     environment = Asked()
     Settings.from_environment(environment=environment)
-    assert set(re.findall(r"RIDETUNE_[A-Z_]+", file.read_text())) <= environment.names
+    assert {name for name in environment.names if name.startswith("RIDETUNE_")} == set(VARIABLES)
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)
+def test_every_variable_is_a_setting(file):
+    assert set(re.findall(r"RIDETUNE_[A-Z_]+", file.read_text())) <= set(VARIABLES)
 
 
 @pytest.mark.parametrize("file", ["Caddyfile", "nginx.conf", "compose.yaml"])
@@ -136,6 +145,26 @@ def test_certificates_are_made_once_and_hold(tmp_path):
     key = (tmp_path / "cluster.key").read_bytes()
     subprocess.run(command, check=True, capture_output=True)
     assert (tmp_path / "cluster.key").read_bytes() == key
+
+
+def test_certificates_are_renewed_as_the_documents_say(tmp_path):
+    """The command that removes the former ones, in another folder; then all are new and hold."""
+    text = (ROOT / "docs/operations.md").read_text()
+    [remove] = re.findall(r"docker compose run --rm certificates sh -c '(rm .*)'", text)
+    names = re.findall(r"certificates \w+ (?:\w+ )*ridetune$", text, re.MULTILINE)[0].split()
+    mounting = [name for name, one in COMPOSE["services"].items() if "certificates" in str(one)]
+    assert set(mounting) == set(names)
+    make = [str(DEPLOY / "make-certificates"), str(tmp_path)]
+    subprocess.run(make, check=True, capture_output=True)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    there = remove.replace("/var/lib/ridetune-certificates", str(tmp_path))
+    subprocess.run(["sh", "-c", there], check=True)
+    assert list(tmp_path.iterdir()) == []
+    subprocess.run(make, check=True, capture_output=True)
+    after = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert after.keys() == before.keys()
+    assert not [name for name in after if after[name] == before[name]]
+    shake_hands(tmp_path)
 
 
 def shake_hands(folder: Path) -> None:

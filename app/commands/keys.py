@@ -3,12 +3,11 @@
 import sys
 from argparse import Namespace
 from collections.abc import Sequence
-from datetime import datetime
 
 from ..key_store import Key, KeyStore
 from ..settings import Settings
 from .kept import kept
-from .output import print_table
+from .output import minute, print_table
 
 
 def keys(options: Namespace) -> None:
@@ -30,10 +29,12 @@ def keys(options: Namespace) -> None:
 
 def _print(known: Sequence[Key]) -> None:
     rows = (
-        (key.name, f"{key.begins}...", _minute(key.created), _minute(key.used)) for key in known
+        (
+            key.name,
+            f"{key.begins}...",
+            minute(key.created),
+            "never" if key.used is None else minute(key.used),
+        )
+        for key in known
     )
     print_table([("name", "key", "made", "used last"), *rows])
-
-
-def _minute(time: float | None) -> str:
-    return "never" if time is None else f"{datetime.fromtimestamp(time):%Y-%m-%d %H:%M}"

@@ -1,9 +1,10 @@
-"""What the commands write: files that appear whole or not at all, and aligned tables."""
+"""What the commands write: files that appear whole or not at all, aligned tables, times."""
 
 import contextlib
 import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from datetime import datetime
 from pathlib import Path
 from typing import BinaryIO
 
@@ -121,6 +122,11 @@ def print_table(rows: Sequence[Sequence[str]], right: Iterable[int] = ()) -> Non
             f"{cell:{side}{width}}" for cell, side, width in zip(row, sides, widths, strict=True)
         )
         print("  ".join(cells).rstrip())
+
+
+def minute(time: float) -> str:
+    """A time, s since 1970, as a table shows it."""
+    return f"{datetime.fromtimestamp(time):%Y-%m-%d %H:%M}"
 
 
 def print_warnings(warnings: Iterable[str]) -> None:

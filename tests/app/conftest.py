@@ -16,8 +16,9 @@ from distributed import LocalCluster
 from fastapi.testclient import TestClient
 from ridetune.app.cli import main
 from ridetune.app.cluster import CONFIGURATION
+from ridetune.app.limits import Limits
 from ridetune.app.main import create_app
-from ridetune.app.settings import Limits, Settings
+from ridetune.app.settings import Settings
 
 from .command_line import SHORT
 from .dask_processes import dask_processes

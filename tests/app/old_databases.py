@@ -113,6 +113,7 @@ DDL: dict[str, list[tuple[int, str]]] = {
         (8, "hash VARCHAR(64) NOT NULL"),
         (8, "created FLOAT NOT NULL"),
         (8, "expires FLOAT NOT NULL"),
+        (9, "token_mark VARCHAR(64)"),
         (8, "PRIMARY KEY (hash)"),
     ],
     "keys": [
@@ -240,7 +241,7 @@ def _all_rows(version: int) -> dict[str, list[dict[str, Any]]]:
         ],
         "database_identity": [{"id": "i" * 32}],
         "links": [{"hash": "1" * 64, "expires": 2e9}],
-        "browsers": [{"hash": "2" * 64, "created": 1e9, "expires": 2e9}],
+        "browsers": [{"hash": "2" * 64, "created": 1e9, "expires": 2e9, "token_mark": None}],
         "keys": [
             {"name": "ci", "hash": "3" * 64, "begins": "rt_abc", "created": 1e9, "used": None}
         ],

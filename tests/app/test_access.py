@@ -5,7 +5,8 @@ import re
 import pytest
 from fastapi.testclient import TestClient
 from ridetune.app.addresses import networks
-from ridetune.app.settings import Limits, Settings
+from ridetune.app.limits import Limits
+from ridetune.app.settings import Settings
 from ridetune.app.tables import browsers
 from sqlalchemy import func, select
 
@@ -168,6 +169,32 @@ def test_the_services_token_lets_in_whoever_brings_it(tmp_path):
             assert program.post("/api/sessions", headers=brought).status_code == 403
         assert program.post("/api/sessions", headers=bearer("open sesame")).status_code == 201
         assert go(another(client), link(client)).status_code == 303
+
+
+def test_another_token_ends_the_browsers_of_the_former_one(tmp_path):
+    """They begin no session; those let in by a link do."""
+
+    def visits(token, cookies):
+        with open_client(Settings(data=tmp_path, token=token), login=True) as client:
+            client.cookies.update(cookies)
+            return client.post("/api/sessions").status_code
+
+    with open_client(Settings(data=tmp_path, token="sesame"), login=True) as client:
+        by_link = another(client)
+        go(by_link, link(client))
+        go(client, "/?token=sesame")
+        cookies = [dict(browser.cookies) for browser in (client, by_link)]
+    assert [visits("sesame", held) for held in cookies] == [201, 201]
+    assert [visits("another", held) for held in cookies] == [403, 201]
+    assert [visits("", held) for held in cookies] == [403, 201]
+
+
+def test_a_browser_that_is_ended_is_out_at_once(client):
+    go(client, link(client))
+    assert client.post("/api/sessions").status_code == 201
+    browsers = stores(client).browsers
+    browsers.remove([browser.id for browser in browsers.list()])
+    assert client.post("/api/sessions").status_code == 403
 
 
 # Keys

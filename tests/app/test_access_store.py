@@ -1,10 +1,11 @@
 """Links, browsers, keys and owners as they are kept: what lets in, how long, and by whose word."""
 
 import pytest
-from ridetune.app import browser_store, key_store
+from ridetune.app import browser_store, key_store, session_store
 from ridetune.app.browser_store import BROWSER_SECONDS, LINK_SECONDS
-from ridetune.app.errors import Conflict, InvalidRequest, NotFound
-from ridetune.app.settings import Limits
+from ridetune.app.errors import Busy, Conflict, InvalidRequest, NotFound
+from ridetune.app.limits import Limits
+from ridetune.app.secret import hashed
 from ridetune.app.store import Store, database_beside
 
 CAR = {"name": "a car"}
@@ -58,6 +59,45 @@ def test_a_browser_that_comes_back_stays_let_in(store, clock):
     assert not store.browsers.knows("guessed")
 
 
+def test_browsers_are_listed_and_ended_by_their_ids(store, clock):
+    one = store.browsers.let_in()
+    clock.now += 60
+    other = store.browsers.let_in("sesame")
+    clock.now += 7200
+    assert store.browsers.knows(other, "sesame")
+    [first, second] = store.browsers.list()
+    assert (first.by_token, first.created, first.came) == (False, 1e9, 1e9)
+    assert (second.by_token, second.created, second.came) == (True, 1e9 + 60, clock.now)
+    assert first.id not in one
+    store.browsers.remove([first.id])
+    assert not store.browsers.knows(one)
+    assert store.browsers.list() == [second]
+    clock.now += BROWSER_SECONDS + 1
+    assert store.browsers.list() == []
+
+
+@pytest.mark.parametrize("wrong", ["", "%", "0" * 12, "_" * 12])
+def test_no_browser_is_ended_by_what_is_no_id(store, wrong):
+    """Nor are others that are named beside it."""
+    secret = store.browsers.let_in()
+    [known] = store.browsers.list()
+    with pytest.raises(NotFound, match="browsers list"):
+        store.browsers.remove([known.id, wrong])
+    assert store.browsers.knows(secret)
+
+
+def test_a_browser_let_in_by_the_token_is_in_as_long_as_that_is_the_token(store):
+    """And one let in by a link whatever the token is."""
+    by_link, by_token = store.browsers.let_in(), store.browsers.let_in("sesame")
+    for token, knows in (("sesame", True), ("another", False), ("", False)):
+        assert store.browsers.knows(by_token, token) is knows
+        assert store.browsers.knows(by_link, token)
+    store.browsers.remove_others("sesame")
+    assert len(store.browsers.list()) == 2
+    store.browsers.remove_others("")
+    assert [browser.by_token for browser in store.browsers.list()] == [False]
+
+
 def test_a_key_tells_its_name_until_it_is_removed(store, clock):
     key = store.keys.add("rig 3")
     assert key.startswith("rt_")
@@ -105,13 +145,15 @@ def test_what_is_kept_lets_nobody_in(tmp_path):
     store = Store(tmp_path, Limits())
     secrets = [
         store.browsers.make_link(),
-        store.browsers.let_in(),
+        store.browsers.let_in("sesame"),
         store.keys.add("rig 3"),
         store.sessions.create(CAR, [])[1],
     ]
     kept = b"".join(file.read_bytes() for file in tmp_path.glob("ridetune.sqlite*"))
     assert b"rig 3" in kept
     assert not [secret for secret in secrets if secret.encode() in kept]
+    assert b"sesame" not in kept
+    assert hashed("sesame").encode() not in kept
     store.close()
 
 
@@ -143,3 +185,20 @@ def test_everybody_lists_their_own(store):
     assert ids(user="user:anna", tokens=[token]) == [mine, later, anna]
     assert ids(user=None, tokens=[token, "guessed"]) == [mine]
     assert ids(user="user:bert", tokens=[]) == ids(user=None, tokens=[]) == []
+
+
+def test_a_users_unused_sessions_make_room_for_their_own_alone(tmp_path, database, monkeypatch):
+    """After an hour; one that holds something stays, and so does another user's."""
+    store = Store(tmp_path, Limits(user_sessions=2), database)
+    make = lambda who: store.sessions.create(CAR, [], who)[0]  # noqa: E731
+    unused, used, others = make("user:anna"), make("user:anna"), make("user:bert")
+    store.sessions.set_vehicle(used, CAR)
+    with pytest.raises(Busy, match="2 sessions"):
+        make("user:anna")
+    monkeypatch.setattr(session_store, "UNUSED_AFTER", -1.0)
+    third = make("user:anna")
+    of = lambda who: {one.id for one in store.owners.sessions(user=who, tokens=[])}  # noqa: E731
+    assert of("user:anna") == {used, third}
+    assert of("user:bert") == {others}
+    assert unused not in of("user:anna")
+    store.close()

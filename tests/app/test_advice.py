@@ -1,7 +1,8 @@
 """Advice over REST: before any run, after an identification, and what is refused."""
 
 import pytest
-from ridetune.app.settings import Limits, Settings
+from ridetune.app.limits import Limits
+from ridetune.app.settings import Settings
 from ridetune.engine.vehicle_file import reference_vehicles, vehicle_to_json
 
 from .conftest import SAMPLES, Visitor, open_client

@@ -13,8 +13,8 @@ import ridetune.app.backup
 from ridetune.app.cli import main
 from ridetune.app.data_directory import DataDirectory
 from ridetune.app.errors import NotFound
+from ridetune.app.limits import Limits
 from ridetune.app.measurement import NewMeasurement
-from ridetune.app.settings import Limits
 from ridetune.app.setup_form import SetupForm
 from ridetune.app.store import Store
 from ridetune.app.tables import SCHEMA_VERSION

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from ridetune.app.cli import main
-from ridetune.app.settings import Limits, Settings
+from ridetune.app.limits import Limits
+from ridetune.app.settings import Settings
 from ridetune.engine.identification.bands import bands
 from ridetune.engine.identification.kept_fit import read_fit
 from ridetune.engine.manoeuvre import reference_manoeuvres

@@ -5,7 +5,8 @@ from fastapi.testclient import TestClient
 from ridetune.app.buckets import Buckets
 from ridetune.app.callers import Callers, caller_of
 from ridetune.app.errors import Busy
-from ridetune.app.settings import Limits, Settings
+from ridetune.app.limits import Limits
+from ridetune.app.settings import Settings
 from starlette.requests import Request
 
 from .conftest import ADDRESS, Visitor, open_client
@@ -111,8 +112,53 @@ def test_a_session_has_its_simulated_seconds(tmp_path):
 
 def test_simulated_seconds_come_back_within_the_hour(clock):
     callers = Callers(Limits(session_simulated_seconds=3600), clock)
-    callers.simulate("a", 3600)
+    callers.simulate("a", None, 3600)
     with pytest.raises(Busy, match="10 minutes"):
-        callers.simulate("a", 600)
+        callers.simulate("a", None, 600)
     clock.now = 600.0
-    callers.simulate("a", 600)
+    callers.simulate("a", None, 600)
+
+
+def test_a_user_has_simulated_seconds_in_all_sessions_together(clock):
+    """Another user, and who is not known by name, has as many as ever."""
+    callers = Callers(Limits(user_simulated_seconds=3600), clock)
+    callers.simulate("a", "key:rig", 1800)
+    callers.simulate("b", "key:rig", 1800)
+    with pytest.raises(Busy, match="all your sessions .* in 30 minutes") as refused:
+        callers.simulate("c", "key:rig", 1800)
+    assert refused.value.headers == {"Retry-After": "1800"}
+    callers.simulate("c", "key:bench", 1800)
+    callers.simulate("c", None, 1800)
+    clock.now = 1800.0
+    callers.simulate("a", "key:rig", 1800)
+
+
+def test_the_sessions_of_a_key_share_its_simulated_seconds(tmp_path):
+    """Also where it is remembered who calls."""
+    limits = Limits(user_simulated_seconds=5)
+    with open_client(Settings(data=tmp_path / "data", limits=limits), login=True) as client:
+        keys = client.app.state.services.store.keys
+        rig, bench = ({"Authorization": f"Bearer {keys.add(name)}"} for name in ("rig", "bench"))
+
+        def simulate(headers):
+            sid = client.post("/api/sessions", headers=headers).json()["id"]
+            address = f"/api/sessions/{sid}/simulations"
+            return [client.post(address, json=SIMULATION, headers=headers) for _ in range(2)]
+
+        replies = [*simulate(rig), *simulate(rig), *simulate(bench)]
+        assert [reply.status_code for reply in replies] == [200, 200, 429, 429, 200, 200]
+        assert 600 < int(replies[2].headers["retry-after"]) <= 720
+
+
+def test_a_user_keeps_so_many_sessions(tmp_path):
+    limits = Limits(user_sessions=2)
+    with open_client(Settings(data=tmp_path / "data", limits=limits), login=True) as client:
+        keys = client.app.state.services.store.keys
+        rig, bench = ({"Authorization": f"Bearer {keys.add(name)}"} for name in ("rig", "bench"))
+        replies = [client.post("/api/sessions", headers=rig) for _ in range(3)]
+        assert [reply.status_code for reply in replies] == [201, 201, 429]
+        assert "already keep 2 sessions; delete one" in replies[2].json()["detail"]
+        assert client.post("/api/sessions", headers=bench).status_code == 201
+        gone = f"/api/sessions/{replies[0].json()['id']}"
+        assert client.delete(gone, headers=rig).status_code == 204
+        assert client.post("/api/sessions", headers=rig).status_code == 201

@@ -7,8 +7,9 @@ import zipfile
 
 import pytest
 from ridetune.app.campaign_job import campaign, check_and_fill, drive_one, join_drives
+from ridetune.app.limits import Limits
 from ridetune.app.schemas import CampaignRequest
-from ridetune.app.settings import Limits, Settings
+from ridetune.app.settings import Settings
 from ridetune.app.worker import Attempt, CutShort
 from ridetune.engine.campaign import CAMPAIGN, Campaign, chosen, roughened
 from ridetune.engine.campaign_run import drive

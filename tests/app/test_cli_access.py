@@ -1,14 +1,16 @@
-"""`ridetune link` and `ridetune keys` beside a service that runs, and what `serve` prints."""
+"""`ridetune link`, `browsers` and `keys` beside a service that runs, and what `serve` prints."""
 
 import os
 import re
 import signal
 import subprocess
 import sys
+import time
 
 import httpx2
 import pytest
 from ridetune.app.cli import main
+from ridetune.app.recent_answers import SECONDS
 
 from .command_line import PROGRAM, refused
 
@@ -80,6 +82,33 @@ def test_keys_come_and_go_beside_the_running_service(service, capsys):
     )
 
 
+def test_a_browser_is_ended_beside_the_running_service(service, capsys):
+    """Within a second, as the documents say."""
+    data = ("--data", str(service[1]))
+    before = run(capsys, "browsers", "list", *data).splitlines()
+    address, token = re.fullmatch(LINK, run(capsys, "link", *data)).groups()
+    with httpx2.Client(base_url=address, timeout=PATIENCE) as browser:
+        assert browser.get(f"/{token}").status_code == 303
+        assert browser.post("/api/sessions").status_code == 201
+        [row] = set(run(capsys, "browsers", "list", *data).splitlines()[1:]) - set(before)
+        known = re.fullmatch(r"([0-9a-f]{12})  a link +[\d: -]{16}  [\d: -]{16}", row)[1]
+        assert known in run(capsys, "browsers", "remove", known, *data)
+        time.sleep(SECONDS)
+        assert browser.post("/api/sessions").status_code == 403
+    assert row not in run(capsys, "browsers", "list", *data)
+
+
+def test_a_service_with_another_token_shows_no_browser_of_the_former_one(tmp_path, capsys):
+    for token, shown in (("sesame", "the token"), ("another", "No browser is let in")):
+        with serve(tmp_path, RIDETUNE_TOKEN=token) as process:
+            address = re.search(r"http://[\d.:]+", process.stdout.readline())[0]
+            if token == "sesame":
+                assert httpx2.get(f"{address}/?token=sesame", timeout=PATIENCE).status_code == 303
+            assert shown in run(capsys, "browsers", "list", "--data", str(tmp_path))
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=60)
+
+
 def test_nobody_forwards_themselves_into_the_proxys_place(tmp_path):
     """The address that counts is that of the connection, whatever is said of others."""
     proxy = {
@@ -105,6 +134,10 @@ def test_nobody_forwards_themselves_into_the_proxys_place(tmp_path):
         ("keys", "add|list|remove"),
         ("keys ad rig", "did you mean add?"),
         ("keys add", "NAME"),
+        ("browsers", "list|remove"),
+        ("browsers remove", "ID"),
+        ("browsers list --data none", "No service has used the data directory none"),
+        ("browsers remove 0123 --data data", "there is no browser '0123'"),
         ("keys remove rig --data data", "there is no key 'rig'"),
         ("keys add rig --data data/file", "cannot be used"),
         ("serve --host 0.0.0.0 --no-login --port 0 --data data", "without login"),

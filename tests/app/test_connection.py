@@ -4,15 +4,17 @@ import asyncio
 import json
 
 import pytest
+from ridetune.app.addresses import networks
 from ridetune.app.bodies import Body
 from ridetune.app.connection import HEAD_BYTES, connections
-from ridetune.app.settings import Limits
+from ridetune.app.limits import Limits
 from starlette.exceptions import HTTPException
 from uvicorn import Config
 from uvicorn.server import ServerState
 
 from .loop import in_a_loop
 
+PROXIES = networks("10.0.0.1")
 LIMITS = Limits(connections=1, head_seconds=10, stalled_seconds=60, body_seconds=20, body_rate=1000)
 HEAD = b"GET / HTTP/1.1\r\nHost: localhost\r\n"
 
@@ -57,11 +59,11 @@ class Timer:
 class Peer:
     """The transport to one peer."""
 
-    def __init__(self):
-        self.ended, self.protocol = "", None
+    def __init__(self, host):
+        self.ended, self.protocol, self.host = "", None, host
 
     def get_extra_info(self, name, default=None):
-        return default
+        return (self.host, 1) if name == "peername" else default
 
     def get_protocol(self):
         return self.protocol
@@ -96,18 +98,23 @@ def loop():
 @pytest.fixture
 def connect(loop):
     """Connections of one server, each with its peer."""
+    return server(loop, LIMITS)
+
+
+def server(loop, limits):
+    """What makes connections to one server."""
 
     async def app(scope, receive, send):
         await send({"type": "http.response.start", "status": 200, "headers": []})
         await send({"type": "http.response.body", "body": b"answered"})
 
-    http, websocket = connections(LIMITS)
+    http, websocket = connections(limits, PROXIES)
     config = Config(app, http=http, ws=websocket, log_config=None)
     config.load()
     state = ServerState()
 
-    def one():
-        connection, peer = http(config, state, {}, loop), Peer()
+    def one(host="127.0.0.1"):
+        connection, peer = http(config, state, {}, loop), Peer(host)
         peer.protocol = connection
         connection.connection_made(peer)
         return connection, peer
@@ -206,6 +213,27 @@ def test_a_connection_too_many_is_told_when_to_come_again(connect):
 def test_twice_too_many_are_not_answered(connect):
     peers = [connect()[1] for _ in range(3)]
     assert [peer.ended for peer in peers] == ["", "", "aborted"]
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "statuses"),
+    [
+        ("192.0.2.7", "192.0.2.7", (200, 503)),
+        ("192.0.2.7", "192.0.2.8", (200, 200)),
+        ("2001:db8:1:2::1", "2001:db8:1:2::2", (200, 503)),
+        ("2001:db8:1:2::1", "2001:db8:1:3::1", (200, 200)),
+        ("10.0.0.1", "10.0.0.1", (200, 200)),
+        ("127.0.0.1", "127.0.0.1", (200, 200)),
+    ],
+)
+def test_an_address_has_a_part_of_the_connections(loop, first, second, statuses):
+    """Many come through a proxy, or from this machine."""
+    connect = server(loop, Limits(connections=10, peer_connections=1))
+    answers = [answer(connect(host)[0], "/") for host in (first, second)]
+    assert tuple(status for status, _, _ in answers) == statuses
+    if statuses[1] == 503:
+        assert "from where you are" in json.loads(answers[1][2])["detail"]
+        assert connect(second)[1].ended == "aborted"
 
 
 def test_a_connection_too_many_becomes_no_websocket(connect):

@@ -9,7 +9,7 @@ from ridetune.app import dispatcher, gatherer, jobs_under_way, lease_keeper
 from ridetune.app.dispatcher import Dispatcher
 from ridetune.app.errors import Unavailable
 from ridetune.app.job_kinds import PATIENT, Division, Kind
-from ridetune.app.settings import Limits
+from ridetune.app.limits import Limits
 from ridetune.app.store import Store
 from ridetune.app.tables import jobs
 from sqlalchemy import update

@@ -3,8 +3,8 @@
 import pytest
 from ridetune.app.errors import Busy, NotFound
 from ridetune.app.job_leases import LEASE
+from ridetune.app.limits import Limits
 from ridetune.app.measurement import NewMeasurement
-from ridetune.app.settings import Limits
 from ridetune.app.store import Store
 
 CAR = {"name": "a car"}

@@ -12,8 +12,8 @@ import pytest
 from fastapi.testclient import TestClient
 from ridetune.app.errors import NotFound, Unavailable
 from ridetune.app.job_store import JobStore
+from ridetune.app.limits import Limits
 from ridetune.app.owner_store import OwnerStore
-from ridetune.app.settings import Limits
 
 from .conftest import Visitor, open_client
 

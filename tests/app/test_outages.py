@@ -8,8 +8,9 @@ from collections.abc import Callable
 
 import pytest
 from ridetune.app.errors import Deleted, Unavailable
+from ridetune.app.limits import Limits
 from ridetune.app.recordings import Recordings
-from ridetune.app.settings import Limits, Settings
+from ridetune.app.settings import Settings
 from ridetune.app.store import Store
 from sqlalchemy import event, text
 

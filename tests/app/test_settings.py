@@ -1,13 +1,15 @@
 """Settings come from the environment; a wrong one is a sentence, a public bind a way to get in."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from ridetune.app.addresses import is_loopback, networks
 from ridetune.app.errors import StartError
-from ridetune.app.settings import Certificates, Settings
+from ridetune.app.settings import VARIABLES, Certificates, Settings
 
+SERVICE = Path(__file__).parents[2] / "docs/service.md"
 PROXY = {"proxy_user_header": "X-Forwarded-User", "proxy_addresses": networks("10.0.0.1")}
 
 
@@ -67,9 +69,36 @@ def test_a_scheduler_behind_tls_needs_its_three_files(tmp_path):
         Settings.from_environment(data="x", environment=environment | {"RIDETUNE_CLUSTER": ""})
 
 
-def test_a_misspelt_limit_is_refused_with_the_nearest():
-    with pytest.raises(StartError, match="did you mean RIDETUNE_LIMIT_SESSIONS?"):
-        Settings.from_environment(data="x", environment={"RIDETUNE_LIMIT_SESIONS": "3"})
+@pytest.mark.parametrize(
+    ("misspelt", "told"),
+    [
+        ("RIDETUNE_LIMIT_SESIONS", "did you mean RIDETUNE_LIMIT_SESSIONS?"),
+        ("RIDETUNE_PROXY_ADDRESS", "did you mean RIDETUNE_PROXY_ADDRESSES?"),
+        ("RIDETUNE_TOKN", "did you mean RIDETUNE_TOKEN?"),
+        ("RIDETUNE_CLUSTER_CERTIFICATE", "did you mean RIDETUNE_CLUSTER_CERT"),
+        ("RIDETUNE_", "There is no setting RIDETUNE_;"),
+        ("RIDETUNE_XQZ", "known are RIDETUNE_HOST"),
+    ],
+)
+def test_a_misspelt_variable_is_refused_with_the_nearest(misspelt, told):
+    """Whatever it is set to; its value, which may be a secret, is not repeated."""
+    with pytest.raises(StartError, match=f"no setting {misspelt};") as refused:
+        Settings.from_environment(data="x", environment={misspelt: "open-sesame"})
+    assert told in str(refused.value)
+    assert "open-sesame" not in str(refused.value)
+
+
+def test_what_is_read_elsewhere_and_what_is_not_ours_is_let_be():
+    environment = {"RIDETUNE_CACHE": "/var/cache/ridetune", "RIDE": "1", "PATH": "/bin"}
+    assert Settings.from_environment(data="x", environment=environment) == Settings(data=Path("x"))
+
+
+@pytest.mark.parametrize("variable", VARIABLES)
+def test_every_variable_is_told_of(variable):
+    """In a table of the documents, the parts of a common name being told by their ends."""
+    told = re.findall(r"`(?:\.\.\.)?_?([A-Z_]+)`", SERVICE.read_text())
+    name = variable.removeprefix("RIDETUNE_LIMIT_")
+    assert {name, name.removeprefix("RIDETUNE_CLUSTER_")} & set(told)
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.2", "car.example"])

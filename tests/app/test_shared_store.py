@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 from ridetune.app.data_directory import DataDirectory
 from ridetune.app.errors import Busy, InvalidRequest, NotFound, StartError
+from ridetune.app.limits import Limits
 from ridetune.app.measurement import NewMeasurement
-from ridetune.app.settings import Limits
 from ridetune.app.store import Store
 
 from .postgresql_server import PostgresqlServer

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from ridetune.app.data_directory import DataDirectory
 from ridetune.app.errors import Busy, Conflict, NotFound, StartError
+from ridetune.app.limits import Limits
 from ridetune.app.measurement import NewMeasurement
-from ridetune.app.settings import Limits
 from ridetune.app.store import Store
 
 CAR = {"name": "a car"}

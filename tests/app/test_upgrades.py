@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from ridetune.app.settings import Limits
+from ridetune.app.limits import Limits
 from ridetune.app.setup_form import SetupForm
 from ridetune.app.store import Store
 from ridetune.app.tables import SCHEMA_VERSION

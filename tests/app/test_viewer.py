@@ -7,7 +7,7 @@ import msgspec
 import pytest
 from ridetune.app import viewer
 from ridetune.app.errors import Busy, Unavailable
-from ridetune.app.settings import Limits
+from ridetune.app.limits import Limits
 from ridetune.app.viewer import Viewers, relay
 from ridetune.app.viser_servers import ADMISSION, HEADER
 from ridetune.engine.vehicle_file import reference_vehicles

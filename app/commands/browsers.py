@@ -1,0 +1,39 @@
+"""`ridetune browsers`: which browsers were let into the service, and an end of that."""
+
+from argparse import Namespace
+from collections.abc import Sequence
+
+from ..browser_store import Browser, BrowserStore
+from ..settings import Settings
+from .kept import kept
+from .output import minute, print_table
+
+
+def browsers(options: Namespace) -> None:
+    """List what is known of the browsers that are let in, or end some of them."""
+    settings = Settings.from_environment(data=options.data)
+    with kept(settings) as database:
+        store = BrowserStore(database)
+        if options.action == "remove":
+            store.remove(options.ids)
+            print(
+                f"Ended: {', '.join(options.ids)}. A session that such a browser has begun stays "
+                "open to it until the session is deleted."
+            )
+        elif known := store.list():
+            _print(known)
+        else:
+            print("No browser is let in; `ridetune link` makes a link that lets one in.")
+
+
+def _print(known: Sequence[Browser]) -> None:
+    rows = (
+        (
+            browser.id,
+            "the token" if browser.by_token else "a link",
+            minute(browser.created),
+            minute(browser.came),
+        )
+        for browser in known
+    )
+    print_table([("id", "let in by", "on", "came last"), *rows])
