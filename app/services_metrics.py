@@ -97,9 +97,16 @@ class ServicesCollector(Collector):
         )
         for became, number in cluster.became.items():
             tasks.add_metric((became,), number)
+        simulators = self._services.simulators
+        lost = CounterMetricFamily(
+            "ridetune_simulators_lost", "Processes that simulate which were lost and replaced."
+        )
+        lost.add_metric((), simulators.lost)
         return [
             _gauge("workers", "Job workers that are there.", cluster.workers()),
+            _gauge("simulators", "Processes that simulate for requests.", simulators.count()),
             tasks,
+            lost,
         ]
 
     def _watched(self) -> list[Metric]:

@@ -76,10 +76,17 @@ class Service:
             return [process, *process.children(recursive=True)]
         return []
 
-    def is_worker(self, process: psutil.Process) -> bool:
-        """Whether a process of the tree, or of the cluster, computes."""
+    def is_simulator(self, process: psutil.Process) -> bool:
+        """Whether a process of the tree simulates for sliders, or is forked for it."""
         with suppress(psutil.Error):
-            return process.pid != self._process.pid and process.num_threads() > 2
+            return any("multiprocessing.forkserver" in part for part in process.cmdline())
+        return False
+
+    def is_worker(self, process: psutil.Process) -> bool:
+        """Whether a process of the tree, or of the cluster, computes for jobs."""
+        with suppress(psutil.Error):
+            others = process.pid == self._process.pid or self.is_simulator(process)
+            return not others and process.num_threads() > 2
         return False
 
     def kill_group(self) -> None:

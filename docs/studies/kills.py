@@ -2,12 +2,13 @@
 
     python docs/studies/kills.py [--kills N] [--seconds S] [--seed N] [--database URL] [--cluster]
 
-Clients create sessions, upload, change cars and submit jobs of every kind, and write down what the
-service acknowledged. Meanwhile something dies every now and then: the service with all its
-processes, the serving process alone, one worker; with --cluster, where scheduler and workers are
-processes of their own, the scheduler too. What was killed is started again. At the end all that was
-acknowledged is compared with what is there: uploads byte for byte, cars as they were last put, jobs
-done with the result that the same request has from a service which nobody disturbed. Needs the
+Clients create sessions, upload, change cars, simulate and submit jobs of every kind, and write down
+what the service acknowledged. Meanwhile something dies every now and then, in turn: the service
+with all its processes, one worker, the serving process alone, one of the processes that simulate;
+with --cluster, where scheduler and workers are processes of their own, the scheduler too. What was
+killed is started again. At the end all that was acknowledged is compared with what is there:
+uploads byte for byte, cars as they were last put, jobs done with the result that the same request
+has from a service which nobody disturbed; and every simulation with the first one. Needs the
 packages of the tests. Status 1 if anything is missing, wrong, stuck or left behind.
 """
 
@@ -73,7 +74,8 @@ def _tried(
     clients = [Client(service, ledger, stop, options.seed + 1 + k) for k in range(CLIENTS)]
     for client in clients:
         client.start()
-    targets = ["service group", "service process", "worker"] + ["scheduler"] * options.cluster
+    targets = ["service group", "worker", "service process", "simulator"]
+    targets += ["scheduler"] * options.cluster
     killed: Counter[str] = Counter()
     ready: list[float] = []
     strays: list[str] = []
@@ -87,8 +89,8 @@ def _tried(
             service.kill()
         elif target == "scheduler" and cluster is not None:
             cluster.kill_scheduler()
-        elif workers := [one for one in before if service.is_worker(one)]:
-            chance.choice(workers).kill()
+        elif some := [one for one in before if _is(service, one, target)]:
+            chance.choice(some).kill()
         else:
             continue
         killed[target] += 1
@@ -127,6 +129,10 @@ def _tried(
     for finding in findings:
         print("FINDING", finding)
     return int(bool(findings))
+
+
+def _is(service: Service, process: psutil.Process, target: str) -> bool:
+    return service.is_worker(process) if target == "worker" else service.is_simulator(process)
 
 
 def _settle(service: Service, ledger: Ledger) -> None:

@@ -36,6 +36,7 @@ class Kind:
     needs_fit: bool = False
 
 
+SIMULATION = {"manoeuvre": "bump", "max_samples": 2}
 RANGES = {"K_F": [15_000, 40_000], "C_F": [800, 3000]}
 KINDS = {
     "identification": Kind("identifications", {"starts": 4, "seed": 1}),
@@ -95,13 +96,23 @@ class Ledger:
 
     sessions: list[Session] = field(default_factory=list)
     in_doubt: int = 0
+    simulations: int = 0
     failures: list[str] = field(default_factory=list)
+    figures: list[dict[str, Any]] = field(default_factory=list)
+
+    def simulated(self, metrics: list[dict[str, Any]]) -> None:
+        """Compare a simulation of the untouched car with the first one."""
+        self.simulations += 1
+        self.figures = self.figures or metrics
+        if difference := _difference(self.figures, metrics, "metrics"):
+            self.failures.append(f"a simulation: {difference}")
 
     def counts(self) -> Counter[str]:
         """How much there is of what."""
         return Counter(
             sessions=len(self.sessions),
             uploads=sum(len(one.uploads) for one in self.sessions),
+            simulations=self.simulations,
             jobs=sum(len(one.jobs) for one in self.sessions),
         )
 
@@ -133,12 +144,17 @@ class Client(threading.Thread):
 
     def _something(self, session: Session) -> None:
         what = self._chance.random()
-        if what < 0.4:
+        if what < 0.3:
             data = RECORDING + b"\n" * (self._number % 5000)
             path = f"/measurements?name=run-{self._number}.csv"
             reply = session.request(self._service, "POST", path, content=data)
             if self._took(reply):
                 session.uploads[reply.json()["id"]] = data
+        elif what < 0.5:
+            body = {**SIMULATION, "vehicle": session.vehicle}
+            reply = session.request(self._service, "POST", "/simulations", json=body)
+            if self._took(reply):
+                self._ledger.simulated(reply.json()["metrics"])
         elif what < 0.7:
             name = f"car {self._number}"
             # It may have been put though nobody says so.

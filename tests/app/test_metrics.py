@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 from prometheus_client.parser import text_string_to_metric_families
+from ridetune.app.errors import Unavailable
 from ridetune.app.main import create_app
 from ridetune.app.observed import METHODS
 from ridetune.app.settings import Settings
@@ -15,6 +16,7 @@ from ridetune.app.tables import jobs
 from sqlalchemy import text, update
 from sqlalchemy.exc import OperationalError
 
+from . import simulator_work
 from .conftest import ADDRESS, Visitor, short_recording
 from .test_viewer import open_socket
 
@@ -137,6 +139,17 @@ def test_statements_that_fail_are_counted_and_what_is_lacking_is_left_out(client
     assert value(found, "sessions") is None
     assert value(found, "workers") == 0
     assert "could not be looked up" in caplog.text
+
+
+def test_simulators_are_counted_and_those_that_were_lost(client):
+    """Work that ends its process is tried twice, hence loses two."""
+    assert value(samples(client), "simulators") == 0
+    simulators = client.app.state.services.simulators
+    with pytest.raises(Unavailable):
+        simulators.run("a", simulator_work.killed)
+    simulators.run("a", simulator_work.process)
+    found = samples(client)
+    assert (value(found, "simulators"), value(found, "simulators_lost_total")) == (1, 2)
 
 
 def test_two_applications_count_apart(tmp_path):
