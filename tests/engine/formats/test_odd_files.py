@@ -48,6 +48,24 @@ def test_a_nested_column_of_parquet_shifts_none_behind_it(tmp_path):
     assert_allclose(found["a_x"][1], files.A_X)
 
 
+@pytest.mark.parametrize(
+    ("name", "other"),
+    [("z", pa.array(files.Z)), ("a", pa.array([{"z": 1.0}] * 50)), ("z", pa.array(["x"] * 50))],
+)
+def test_a_date_of_parquet_is_told_from_another_column_of_its_name(tmp_path, name, other):
+    """Parquet allows a name twice, and a field `z` of `a` has the path of a column `a.z`."""
+    dates = pa.array(np.datetime64("2024-03-12T10:00", "ns") + (1e9 * files.TIME).astype("m8[ns]"))
+    date = "a.z" if name == "a" else name
+    pq.write_table(
+        pa.Table.from_arrays([other, dates, pa.array(files.A_X)], [name, date, "a_x"]),
+        tmp_path / "r.parquet",
+    )
+    found = table(tmp_path / "r.parquet", "Parquet")
+    index = next(k for k, one in enumerate(found.columns) if (one.name, one.unit) == (date, "s"))
+    assert_allclose(found.values(index), files.TIME, atol=1e-9)
+    assert_allclose(by_name(found)["a_x"][1], files.A_X)
+
+
 def test_what_is_left_out_shifts_no_clock(tmp_path):
     """An empty matrix stands before the times, in the order of the file."""
     with h5py.File(tmp_path / "r.h5", "w") as file:
