@@ -92,7 +92,7 @@ class MdfFile(Table):
             samples_only=True,
             record_offset=begin,
             record_count=count,
-            ignore_invalidation_bits=False,
+            ignore_invalidation_bits=True,
         )
         values = numbers(samples)
         if invalid is not None and len(invalid) == len(values):

@@ -11,6 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import scipy.io
+from asammdf import MDF, Signal
 from nptdms import ChannelObject, TdmsWriter
 from numpy.testing import assert_allclose
 from ridetune.engine.errors import MeasurementError, RideError
@@ -64,6 +65,24 @@ def test_a_date_of_parquet_is_told_from_another_column_of_its_name(tmp_path, nam
     index = next(k for k, one in enumerate(found.columns) if (one.name, one.unit) == (date, "s"))
     assert_allclose(found.values(index), files.TIME, atol=1e-9)
     assert_allclose(by_name(found)["a_x"][1], files.A_X)
+
+
+def mdf(path, version):
+    """A file of two channels, of which `a_x` has an invalid sample."""
+    invalid = np.arange(50) == 3 if version >= "4" else None
+    with MDF(version=version) as file:
+        z = Signal(files.Z, files.TIME, name="chassis.z")
+        file.append([z, Signal(files.A_X, files.TIME, name="a_x", invalidation_bits=invalid)])
+        file.save(path)
+    return table(path, f"MDF{version[0]}")
+
+
+def test_an_invalid_sample_of_mdf_is_no_number(tmp_path):
+    """Oracle: the others, at their places."""
+    found = by_name(mdf(tmp_path / "r.mf4", "4.10"))
+    expected = np.where(np.arange(50) == 3, np.nan, files.A_X)
+    np.testing.assert_array_equal(found["a_x"][1], expected)
+    np.testing.assert_array_equal(found["chassis.z"][1], files.Z)
 
 
 def test_what_is_left_out_shifts_no_clock(tmp_path):
