@@ -67,12 +67,18 @@ def test_a_date_of_parquet_is_told_from_another_column_of_its_name(tmp_path, nam
     assert_allclose(by_name(found)["a_x"][1], files.A_X)
 
 
-def mdf(path, version):
-    """A file of two channels, of which `a_x` has an invalid sample."""
+def mdf(path, version, spoilt="", **fields):
+    """Two channels, of which `a_x` of MDF 4 has an invalid sample, as a table.
+
+    fields : what the description of the channel `spoilt` says instead
+    """
     invalid = np.arange(50) == 3 if version >= "4" else None
     with MDF(version=version) as file:
         z = Signal(files.Z, files.TIME, name="chassis.z")
         file.append([z, Signal(files.A_X, files.TIME, name="a_x", invalidation_bits=invalid)])
+        for channel in file.groups[0].channels:
+            for name, value in fields.items() if channel.name == spoilt else ():
+                setattr(channel, name, value)
         file.save(path)
     return table(path, f"MDF{version[0]}")
 
@@ -83,6 +89,26 @@ def test_an_invalid_sample_of_mdf_is_no_number(tmp_path):
     expected = np.where(np.arange(50) == 3, np.nan, files.A_X)
     np.testing.assert_array_equal(found["a_x"][1], expected)
     np.testing.assert_array_equal(found["chassis.z"][1], files.Z)
+
+
+@pytest.mark.parametrize("spoilt", ["chassis.z", "time"])
+@pytest.mark.parametrize(
+    ("name", "version", "fields"),
+    [
+        ("r.mdf", "3.30", {"additional_byte_offset": 2048}),
+        ("r.mf4", "4.10", {"byte_offset": 1 << 20}),
+        ("r.mf4", "4.10", {"flags": 2, "pos_invalidation_bit": 1 << 30}),
+    ],
+)
+def test_a_channel_of_mdf_outside_its_record_is_left_out(tmp_path, spoilt, name, version, fields):
+    """Else asammdf writes beyond its memory, and this file or the next ends the process."""
+    found = mdf(tmp_path / name, version, spoilt, **fields)
+    [said] = [one for one in found.warnings if "outside its record" in one]
+    assert f"{spoilt} lies" in said
+    assert sorted(by_name(found)) == sorted({"a_x", "chassis.z", "time"} - {spoilt})
+    column, values = by_name(found)["a_x"]
+    assert_allclose(values[4:], files.A_X[4:])
+    assert (column.clock is None) == (spoilt == "time")
 
 
 def test_what_is_left_out_shifts_no_clock(tmp_path):
