@@ -1,7 +1,9 @@
 """MDF 3 and MDF 4 (ASAM), by asammdf: loggers and calibration tools.
 
 Each group of channels has its clock, the master channel, in s. Conversions to physical values are
-asammdf's. Channels of text, bytes and arrays are left out. Invalid samples become NaN.
+asammdf's. Channels of text, bytes and arrays are left out, and those that a damaged description
+places outside the record, for which asammdf writes and reads beyond its memory. Invalid samples
+become NaN.
 """
 
 import html
@@ -21,6 +23,12 @@ _TX = re.compile(r"<TX[^>]*>(.*?)</TX>", re.DOTALL)
 
 _PLAIN_DATA = {3: {0, 1, 2, 3, 9, 10, 11, 13, 14, 15, 16}, 4: {0, 1, 2, 3, 4, 5}}
 """Types of data, by version, that are whole numbers or floats."""
+
+_VIRTUAL = {3, 6}
+"""Types of channel of MDF 4 that count the samples and take no room in the record."""
+
+_INVALIDATION = 0b10
+"""Flag of a channel of MDF 4 that has a bit for invalid samples."""
 
 
 class MdfFile(Table):
@@ -49,7 +57,7 @@ class MdfFile(Table):
         if samples == 0:
             return
         master, clock = self._file.masters_db.get(number), None
-        if master is not None and self._is_time(group.channels[master]):
+        if master is not None and self._is_clock(group.channels[master], group.channel_group):
             clock = listing.add(
                 Column(plain(group.channels[master].name), "s", samples, label), (number, master)
             )
@@ -60,6 +68,9 @@ class MdfFile(Table):
             if self._is_text(channel):
                 listing.leave_out(name, "holds no plain numbers")
                 continue
+            if self._is_outside(channel, group.channel_group):
+                listing.leave_out(name, "lies outside its record")
+                continue
             conversion = channel.conversion
             unit = first_text(conversion.unit if conversion else "", channel.unit)
             column = Column(
@@ -67,8 +78,21 @@ class MdfFile(Table):
             )
             listing.add(column, (number, index))
 
-    def _is_time(self, channel: Any) -> bool:
-        return self._version == 3 or channel.sync_type == 1
+    def _is_clock(self, channel: Any, record: Any) -> bool:
+        is_time = self._version == 3 or channel.sync_type == 1
+        return is_time and not self._is_outside(channel, record)
+
+    def _is_outside(self, channel: Any, record: Any) -> bool:
+        room = 8 * record.samples_byte_nr
+        if self._version == 3:
+            begin = channel.start_offset + 8 * getattr(channel, "additional_byte_offset", 0)
+            return begin + channel.bit_count > room
+        if channel.flags & _INVALIDATION:
+            flags = 8 * record.invalidation_bytes_nr
+            if 0 < flags <= channel.pos_invalidation_bit:
+                return True
+        begin = 8 * channel.byte_offset + channel.bit_offset
+        return channel.channel_type not in _VIRTUAL and begin + channel.bit_count > room
 
     def _is_text(self, channel: Any) -> bool:
         conversion = channel.conversion
@@ -92,7 +116,7 @@ class MdfFile(Table):
             samples_only=True,
             record_offset=begin,
             record_count=count,
-            ignore_invalidation_bits=False,
+            ignore_invalidation_bits=True,
         )
         values = numbers(samples)
         if invalid is not None and len(invalid) == len(values):

@@ -40,8 +40,10 @@ class ParquetTable(Table):
             stated = field.metadata or {}
             unit = first_text(stated.get(b"unit"), stated.get(b"units"), unit)
             if samples and pa.types.is_timestamp(field.type):
+                # Of every column of that name: one may be no date, or be nested.
                 first = next(self._file.iter_batches(batch_size=1, columns=[field.name]))
-                begins.append(first.column(0).to_numpy(zero_copy_only=False)[0])
+                dates = [one for one in first.columns if pa.types.is_timestamp(one.type)]
+                begins += [one.to_numpy(zero_copy_only=False)[0] for one in dates]
             unit = "s" if pa.types.is_temporal(field.type) else unit
             found.append(((name,), Column(name, unit, samples), place))
         listing.add_timed(found)

@@ -85,12 +85,17 @@ def check_text(said: str) -> None:
 
 
 @contextmanager
-def refused(name: str) -> Iterator[None]:
-    """A block that may end with one of our errors, whose sentence is checked."""
+def refused(name: str, never: bool = False) -> Iterator[None]:
+    """A block that may end with one of our errors, whose sentence is checked.
+
+    never : it may not, for the file is sound
+    """
     try:
         yield
     except RideError as error:
-        sentence(error, name)
+        said = sentence(error, name)
+        if never:
+            raise AssertionError(f"sound, but refused: {said}") from error
 
 
 def shape(said: str, name: str) -> str:

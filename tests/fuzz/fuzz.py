@@ -5,9 +5,10 @@
 Of a kind, one file in four is sound and hard to bear (`hostile`), one in eight is cut short or has
 its line ends converted, the rest has one to four mutations (`mutations`). One child reads many
 files, one after the other, under the limits of a real one; where it dies, the next file starts
-another. What it answers goes the ways of a recording: every column, envelopes, the survey and guess
-of `ridetune channels`, the run of a mapping and of titles, or a road. Texts that people write
-(vehicle, manoeuvre, mapping, sensors, notes) are read in this process (`texts`).
+another, and a sound one is read once more, since those before it may have spoilt the memory. What
+it answers goes the ways of a recording: every column, envelopes, the survey and guess of `ridetune
+channels`, the run of a mapping and of titles, or a road. Texts that people write (vehicle,
+manoeuvre, mapping, sensors, notes) are read in this process (`texts`).
 
 A finding, which keeps the file and ends with status 1: another error than ours; a sentence that is
 not one line, does not begin with the file's name, or shows what only a programmer understands; a
@@ -57,6 +58,8 @@ BOUNDS = Bounds(cpu=60, wall=30.0)
 MOST_OPEN = 24
 """Files that a child may hold open before another takes its place: some readers close none."""
 
+ENDED = "sound, but its reader ended"
+
 TRACKS = {"left": HALF_TRACK, "right": -HALF_TRACK}
 
 
@@ -96,9 +99,14 @@ class Worker(ChildTable):
         return 0.0
 
     @property
+    def ended(self) -> bool:
+        """Whether it runs no more."""
+        return self._process.poll() is not None
+
+    @property
     def fresh(self) -> bool:
         """Whether it runs and has time and files to go on."""
-        if self._process.poll() is not None or self.cpu > 0.5 * BOUNDS.cpu:
+        if self.ended or self.cpu > 0.5 * BOUNDS.cpu:
             return False
         return len(os.listdir(f"/proc/{self.pid}/fd")) < MOST_OPEN
 
@@ -131,7 +139,8 @@ def read(path: Path, kind: str, worker: Worker, expected: Mapping[str, np.ndarra
     index, table, compared = random.Random(len(columns)).randrange(len(columns)), "table", set()
     known = {k for k, column in enumerate(columns) if column.name in (expected or {})}
     for k in {*range(min(20, len(columns))), index, *known}:
-        with refused(path.name):
+        # In text, what is no number spoils its own column, and is found when that is read.
+        with refused(path.name, never=sound and (k in known or worker.kind != "CSV")):
             values = worker.values(k)
             assert len(values) == columns[k].samples
             if expected and k in known:
@@ -148,6 +157,7 @@ def read(path: Path, kind: str, worker: Worker, expected: Mapping[str, np.ndarra
     if kind == ROAD:
         with refused(path.name):
             crg_road(worker)
+        assert not (sound and worker.ended), ENDED
         return table
     with refused(path.name):
         found = survey(worker)
@@ -159,6 +169,7 @@ def read(path: Path, kind: str, worker: Worker, expected: Mapping[str, np.ndarra
         mapped_run(worker, ChannelMapping((one,), longest_gap=1.0), {}, "")
     with refused(path.name):
         named_run(worker, {}, "")
+    assert not (sound and worker.ended), ENDED
     return table
 
 
@@ -275,7 +286,16 @@ def outcomes(kind: str, seconds: float, seed: int, keep: Path, fewest: int = 10)
                 cpu, here = worker.cpu, time.process_time()
                 try:
                     warnings.simplefilter("error")
-                    outcome = read(path, told, worker, expected)
+                    try:
+                        outcome = read(path, told, worker, expected)
+                    except AssertionError:
+                        if not (path.stem == "hostile" and worker.ended):
+                            raise
+                        # A file before it may have spoilt the memory; a recording is the first.
+                        worker.close()
+                        worker = fresh_worker(files.sound, kind)
+                        cpu = worker.cpu
+                        outcome = read(path, told, worker, expected)
                     spent = max(worker.cpu - cpu, time.process_time() - here)
                     tally.cpu = max(tally.cpu, spent)
                     assert spent < SLOWEST, "slow"

@@ -70,7 +70,7 @@ def csv(path: Path, chance: random.Random) -> None:
 
 
 def mdf(version: str) -> Callable[[Path, random.Random], None]:
-    """Other groups with their own clocks, texts, whole numbers and conversions."""
+    """Other groups with their own clocks, texts, whole numbers, invalid samples, conversions."""
 
     def write(path: Path, chance: random.Random) -> None:
         with MDF(version=version) as file:
@@ -79,7 +79,8 @@ def mdf(version: str) -> Callable[[Path, random.Random], None]:
                 clock = odd(chance, length).astype(float)
                 if chance.random() < 0.7:
                     clock = np.sort(np.nan_to_num(clock, posinf=1e9, neginf=-1e9))
-                signals = [_signal(chance, clock) for _ in range(chance.randint(1, 3))]
+                many, invalidates = chance.randint(1, 3), version >= "4"
+                signals = [_signal(chance, clock, invalidates) for _ in range(many)]
                 file.append(signals, acq_name=chance.choice(NAMES), common_timebase=True)
             sound = [Signal(one, TIME, name=n, unit=u) for n, (one, u) in CHANNELS.items()]
             file.append(sound, acq_name="ride", common_timebase=True)
@@ -88,7 +89,7 @@ def mdf(version: str) -> Callable[[Path, random.Random], None]:
     return write
 
 
-def _signal(chance: random.Random, clock: np.ndarray) -> Signal:
+def _signal(chance: random.Random, clock: np.ndarray, invalidates: bool) -> Signal:
     values = odd(chance, len(clock))
     if chance.random() < 0.2:
         values = np.array([b"text"] * len(clock))
@@ -97,7 +98,16 @@ def _signal(chance: random.Random, clock: np.ndarray) -> Signal:
         conversion = {"a": chance.choice(REALS), "b": chance.choice(REALS)}
     name, unit = chance.choice(NAMES), chance.choice(UNITS)
     encoding = "latin-1" if values.dtype.kind == "S" else None
-    return Signal(values, clock, name=name, unit=unit, conversion=conversion, encoding=encoding)
+    invalid = np.arange(len(clock)) % 3 == 0 if invalidates and chance.random() < 0.3 else None
+    return Signal(
+        values,
+        clock,
+        name=name,
+        unit=unit,
+        conversion=conversion,
+        encoding=encoding,
+        invalidation_bits=invalid,
+    )
 
 
 def mat5(path: Path, chance: random.Random) -> None:

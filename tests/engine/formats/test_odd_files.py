@@ -11,6 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import scipy.io
+from asammdf import MDF, Signal
 from nptdms import ChannelObject, TdmsWriter
 from numpy.testing import assert_allclose
 from ridetune.engine.errors import MeasurementError, RideError
@@ -46,6 +47,68 @@ def test_a_nested_column_of_parquet_shifts_none_behind_it(tmp_path):
     found = by_name(table(tmp_path / "r.parquet", "Parquet"))
     assert_allclose(found["chassis.z"][1], files.Z)
     assert_allclose(found["a_x"][1], files.A_X)
+
+
+@pytest.mark.parametrize(
+    ("name", "other"),
+    [("z", pa.array(files.Z)), ("a", pa.array([{"z": 1.0}] * 50)), ("z", pa.array(["x"] * 50))],
+)
+def test_a_date_of_parquet_is_told_from_another_column_of_its_name(tmp_path, name, other):
+    """Parquet allows a name twice, and a field `z` of `a` has the path of a column `a.z`."""
+    dates = pa.array(np.datetime64("2024-03-12T10:00", "ns") + (1e9 * files.TIME).astype("m8[ns]"))
+    date = "a.z" if name == "a" else name
+    pq.write_table(
+        pa.Table.from_arrays([other, dates, pa.array(files.A_X)], [name, date, "a_x"]),
+        tmp_path / "r.parquet",
+    )
+    found = table(tmp_path / "r.parquet", "Parquet")
+    index = next(k for k, one in enumerate(found.columns) if (one.name, one.unit) == (date, "s"))
+    assert_allclose(found.values(index), files.TIME, atol=1e-9)
+    assert_allclose(by_name(found)["a_x"][1], files.A_X)
+
+
+def mdf(path, version, spoilt="", **fields):
+    """Two channels, of which `a_x` of MDF 4 has an invalid sample, as a table.
+
+    fields : what the description of the channel `spoilt` says instead
+    """
+    invalid = np.arange(50) == 3 if version >= "4" else None
+    with MDF(version=version) as file:
+        z = Signal(files.Z, files.TIME, name="chassis.z")
+        file.append([z, Signal(files.A_X, files.TIME, name="a_x", invalidation_bits=invalid)])
+        for channel in file.groups[0].channels:
+            for name, value in fields.items() if channel.name == spoilt else ():
+                setattr(channel, name, value)
+        file.save(path)
+    return table(path, f"MDF{version[0]}")
+
+
+def test_an_invalid_sample_of_mdf_is_no_number(tmp_path):
+    """Oracle: the others, at their places."""
+    found = by_name(mdf(tmp_path / "r.mf4", "4.10"))
+    expected = np.where(np.arange(50) == 3, np.nan, files.A_X)
+    np.testing.assert_array_equal(found["a_x"][1], expected)
+    np.testing.assert_array_equal(found["chassis.z"][1], files.Z)
+
+
+@pytest.mark.parametrize("spoilt", ["chassis.z", "time"])
+@pytest.mark.parametrize(
+    ("name", "version", "fields"),
+    [
+        ("r.mdf", "3.30", {"additional_byte_offset": 2048}),
+        ("r.mf4", "4.10", {"byte_offset": 1 << 20}),
+        ("r.mf4", "4.10", {"flags": 2, "pos_invalidation_bit": 1 << 30}),
+    ],
+)
+def test_a_channel_of_mdf_outside_its_record_is_left_out(tmp_path, spoilt, name, version, fields):
+    """Else asammdf writes beyond its memory, and this file or the next ends the process."""
+    found = mdf(tmp_path / name, version, spoilt, **fields)
+    [said] = [one for one in found.warnings if "outside its record" in one]
+    assert f"{spoilt} lies" in said
+    assert sorted(by_name(found)) == sorted({"a_x", "chassis.z", "time"} - {spoilt})
+    column, values = by_name(found)["a_x"]
+    assert_allclose(values[4:], files.A_X[4:])
+    assert (column.clock is None) == (spoilt == "time")
 
 
 def test_what_is_left_out_shifts_no_clock(tmp_path):
