@@ -316,6 +316,7 @@ def test_followers_wait_for_a_database_that_is_away(service, owner, clusters, mo
 
         return called
 
+    service.app.state.services.store.answers.forget()
     monkeypatch.setattr(OwnerStore, "opens", meanwhile(opens, []))
     assert [told["state"] for _, told in events(owner, job)] == ["cancelled"]
     assert not away
