@@ -74,15 +74,20 @@ def create_app(
     settings: Settings,
     *,
     store: Store | None = None,
+    simulators: Simulators | None = None,
     warm_up: Callable[[WarmUp, Simulators], object] = ready_to_simulate,
 ) -> FastAPI:
-    """The service; its data directory is locked from here or from start-up until it stops."""
+    """The service; its data directory is locked from here or from start-up until it stops.
+
+    simulators : those that several services of one process have in common, which outlast it
+    """
 
     draining, metrics = Draining(), Metrics()
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        services = _services(settings, store, warm_up, draining, metrics)
+        ours = simulators or Simulators(CORES)
+        services = _services(settings, store, ours, warm_up, draining, metrics)
         app.state.services = services
         services.warmup.start()
         services.jobs.start(asyncio.get_running_loop())
@@ -99,7 +104,7 @@ def create_app(
                 task.cancel()
             await asyncio.gather(*own, return_exceptions=True)
             metrics.registry.unregister(collector)
-            await asyncio.to_thread(_close, services)
+            await asyncio.to_thread(_close, services, lent=simulators is not None)
 
     app = FastAPI(
         title="ridetune",
@@ -150,6 +155,7 @@ def create_app(
 def _services(
     settings: Settings,
     store: Store | None,
+    simulators: Simulators,
     warm_up: Callable[[WarmUp, Simulators], object],
     draining: Draining,
     metrics: Metrics,
@@ -157,7 +163,6 @@ def _services(
     store = store or Store(settings.data, settings.limits, settings.database)
     cluster = Cluster(settings.cluster, store.directory.scratch, certificates=settings.certificates)
     recordings = Recordings(store)
-    simulators = Simulators(CORES, recordings.run)
     warmup = WarmUp(lambda warmup: warm_up(warmup, simulators))
     return Services(
         settings=settings,
@@ -225,8 +230,11 @@ def _viewers(limits: Limits) -> Viewers | None:
     return Scenes(limits)
 
 
-def _close(services: Services) -> None:
-    """End the parts, those first that others serve; one that fails leaves none of them open."""
+def _close(services: Services, *, lent: bool) -> None:
+    """End the parts, those first that others serve; one that fails leaves none of them open.
+
+    lent : whether the simulators are another's
+    """
     with contextlib.ExitStack() as last_first:
         last_first.callback(services.store.close)
         if services.viewers is not None:
@@ -234,7 +242,8 @@ def _close(services: Services) -> None:
         # Jobs are handed back once no request adds one any more.
         last_first.callback(services.jobs.close)
         last_first.callback(services.readers.close)
-        last_first.callback(services.simulators.close)
+        if not lent:
+            last_first.callback(services.simulators.close)
         last_first.callback(services.interactive.close)
         last_first.callback(services.warmup.close)
 

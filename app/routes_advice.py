@@ -26,7 +26,7 @@ async def advise(sid: SessionId, services: Shared, body: AdviceRequest) -> Mappi
 def _advice(services: Services, sid: str, body: AdviceRequest) -> Mapping[str, Any]:
     store, asked = services.store, body.identification
     fitted = None if asked is None else services.jobs.get(sid, asked, IDENTIFICATION)
-    return services.simulators.run(
+    return services.in_simulator(
         sid,
         advised,
         body,

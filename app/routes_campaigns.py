@@ -57,7 +57,7 @@ def _spec(services: Services, sid: str, body: CampaignRequest) -> dict[str, Any]
     """Everything that the job needs, checked."""
     store = services.store
     vehicle, limits = store.sessions.get(sid).vehicle, services.settings.limits
-    spec = services.simulators.run(sid, check_and_fill, body, vehicle, limits)
+    spec = services.in_simulator(sid, check_and_fill, body, vehicle, limits)
     store.files.require_room(sid, spec.pop("most_bytes"))
     return spec
 

@@ -54,4 +54,4 @@ def _spec(services: Services, sid: str, body: IdentificationRequest) -> dict[str
             "add the run.",
             field="braking",
         )
-    return services.simulators.run(sid, filled_in, spec, kept, services.settings.limits)
+    return services.in_simulator(sid, filled_in, spec, kept, services.settings.limits)

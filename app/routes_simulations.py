@@ -50,7 +50,7 @@ def _simulated(
     if body.bands is not None:
         fit = done(services.jobs.get(sid, body.bands.identification, IDENTIFICATION))
     store = services.store
-    content, shown = services.simulators.run(
+    content, shown = services.in_simulator(
         sid,
         simulated,
         body,

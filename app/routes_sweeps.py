@@ -56,7 +56,7 @@ def _spec(services: Services, sid: str, body: SweepRequest) -> dict[str, Any]:
     vehicle = store.sessions.get(sid).vehicle if body.vehicle is None else body.vehicle
     kept = recording_of(body, sid, store)
     limits = services.settings.limits
-    spec = services.simulators.run(sid, check_and_fill, body, vehicle, kept, limits)
+    spec = services.in_simulator(sid, check_and_fill, body, vehicle, kept, limits)
     store.files.require_room(sid, spec.pop("most_bytes"))
     return spec
 

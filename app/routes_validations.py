@@ -42,7 +42,7 @@ def _spec(services: Services, sid: str, body: ValidationRequest) -> dict[str, An
     fitted = services.jobs.get(sid, body.identification, IDENTIFICATION)
     done(fitted)
     store = services.store
-    spec = services.simulators.run(
+    spec = services.in_simulator(
         sid,
         check_and_fill,
         body,

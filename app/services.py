@@ -1,7 +1,8 @@
 """What the handlers share, made once per service and found at `app.state.services`."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any, Protocol, cast
+from typing import Annotated, Any, Protocol, TypeVar, cast
 
 from fastapi import Depends
 from starlette.requests import HTTPConnection
@@ -19,6 +20,8 @@ from .settings import Settings
 from .simulators import Simulators
 from .store import Store
 from .warmup import WarmUp
+
+T = TypeVar("T")
 
 
 class Viewers(Protocol):
@@ -63,6 +66,14 @@ class Services:
     metrics: Metrics
     callers: Callers
     viewers: Viewers | None = None
+
+    def in_simulator(
+        self, sid: str, work: Callable[..., T], *given: Any, **answers: Callable[..., Any]
+    ) -> T:
+        """Result of `work(host, *given)` in a simulator, for a session; on a thread of the pool for
+        interactive work. `answers` are what the work may ask for besides recordings.
+        """
+        return self.simulators.run(sid, work, *given, recording=self.recordings.run, **answers)
 
 
 def services_of(connection: HTTPConnection) -> Services:

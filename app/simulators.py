@@ -11,11 +11,9 @@ import threading
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
-from ..engine.run import Run
 from . import logs
 from .errors import Unavailable
 from .forking import processes
-from .measurement import Measurement
 from .simulator import ASKED, DONE, FAILED, READY, REFUSED, simulator
 
 log = logging.getLogger(__name__)
@@ -43,19 +41,19 @@ class _Lost(Exception):
 class Simulators:
     """All simulators of a service; used from the threads of its pool for interactive work."""
 
-    def __init__(self, number: int, recording: Callable[[Measurement], Run]):
-        """recording : gives a simulator the recordings that its work is about"""
-        self._number, self._recording = number, recording
+    def __init__(self, number: int):
+        self._number = number
         self._all: dict[int, _Simulator] = {}
         self._free = set(range(number))
         self._changed = threading.Condition()
         self._closed = False
         self.lost = 0
         """How many were lost since the service started."""
+        # Before multiprocessing waits for its processes, which do not heed its request to end.
+        atexit.register(self.close)
 
     def start(self) -> None:
         """Have all of them ready; RuntimeError where they cannot be started."""
-        atexit.register(self.close)
         for place in range(self._number):
             with self._changed:
                 self._changed.wait_for(lambda place=place: place in self._free)
@@ -69,18 +67,18 @@ class Simulators:
         """Result of `work(host, *given)` in a simulator, or the error that it raised.
 
         session : works in the same simulator as before if it can, which knows its recordings
-        answers : functions that the work may ask for by their names, called here
+        answers : functions that the work may ask for by their names, called here; `recording`
+            gives the run of a measurement
         """
         place = self._taken(session)
-        asked: Answers = {"recording": self._recording, **answers}
         try:
             try:
-                return self._at(place).run(work, given, asked)
+                return self._at(place).run(work, given, answers)
             except _Lost as lost:
                 self._forget(place)
                 if lost.silent:
                     raise
-                return self._at(place).run(work, given, asked)
+                return self._at(place).run(work, given, answers)
         except _Lost:
             self._forget(place)
             raise Unavailable(

@@ -19,6 +19,7 @@ from ridetune.app.cluster import CONFIGURATION
 from ridetune.app.limits import Limits
 from ridetune.app.main import create_app
 from ridetune.app.settings import Settings
+from ridetune.app.simulators import Simulators
 
 from .command_line import SHORT
 from .dask_processes import dask_processes
@@ -32,11 +33,16 @@ PATIENCE = 120.0
 """How long a job may take, s."""
 
 
+SIMULATORS = Simulators(2)
+"""Of all services in this process: each of its own would import the engine anew."""
+
+
 def open_client(settings: Settings, *, login: bool = False, **options) -> TestClient:
     """A client of a fresh service that takes the kernels as compiled, and lets everybody in unless
     there is to be a `login`; enter it to start.
     """
-    app = create_app(replace(settings, login=login), warm_up=lambda *_: None)
+    settings = replace(settings, login=login)
+    app = create_app(settings, simulators=SIMULATORS, warm_up=lambda *_: None)
     return TestClient(app, base_url=ADDRESS, **options)
 
 

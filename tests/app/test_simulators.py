@@ -39,7 +39,7 @@ def recording() -> Measurement:
 
 @pytest.fixture
 def two():
-    simulators = Simulators(2, lambda measurement: read_run(SAMPLE))
+    simulators = Simulators(2)
     yield simulators
     simulators.close()
 
@@ -135,10 +135,11 @@ def test_a_simulator_remembers_recordings(recording):
         fetched.append(measurement.id)
         return read_run(SAMPLE)
 
-    one = Simulators(1, fetch)
+    one = Simulators(1)
     try:
-        runs = [one.run("a", work.run_of, recording) for _ in range(2)]
-        assert one.run("a", work.motions, [recording, recording], RimsSettings()) == 1
+        runs = [one.run("a", work.run_of, recording, recording=fetch) for _ in range(2)]
+        twice = [recording, recording]
+        assert one.run("a", work.motions, twice, RimsSettings(), recording=fetch) == 1
     finally:
         one.close()
     assert fetched == ["m"]

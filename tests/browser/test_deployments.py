@@ -50,6 +50,7 @@ def deployment(request, tmp_path) -> Deployment:
     )
 
 
+@pytest.mark.slow
 def test_from_an_upload_over_a_crash_to_a_redesign(visit, deployment):
     """Upload, fit, kill -9 while a validation runs, and all goes on: the validation ends, the fit
     is applied, a slider is moved and kept, a virtual car is driven."""

@@ -33,6 +33,7 @@ ARITHMETIC_INSTRUCTION = re.compile(
     not get_host_cpu_features().get("avx2"), reason="this processor has no AVX2 to pack for"
 )
 @pytest.mark.parametrize("kernel", [integrate_free, integrate_rims], ids=["free", "rims"])
+@pytest.mark.slow
 def test_a_batch_s_arithmetic_is_packed(kernel):
     """At least 80 % of the floating-point instructions work on several cars at once; a scalar
     loop over cars would have none. What a road look-up and a histogram need is left."""

@@ -111,6 +111,7 @@ def test_half_the_step_changes_little():
         assert miss < 0.01 * np.abs(fine[name]).max()
 
 
+@pytest.mark.slow
 def test_coasting_slows_it_by_the_rolling_resistance():
     """Oracle: fr M g over the apparent mass, over whole swings of the start."""
     run = drive(CAR, Manoeuvre("coast", "road", 2.0, initial_speed=10.0))
@@ -125,6 +126,7 @@ def stopped():
     return drive(CAR, Manoeuvre("stop", "road", 3.0, initial_speed=4.0, brake=brake))
 
 
+@pytest.mark.slow
 def test_brakes_slow_it_as_asked(stopped):
     """Oracle: the law's level; 4 m/s take 4 / 0.3 g, to the swinging of the measured point."""
     t, v = stopped.time, stopped["chassis.v_x"]
@@ -135,6 +137,7 @@ def test_brakes_slow_it_as_asked(stopped):
     assert front / (front + rear) == pytest.approx(0.65)
 
 
+@pytest.mark.slow
 def test_braking_moves_load_to_the_front_and_makes_it_dive(stopped):
     """Oracle: moment balance about the ground, dW = M a h / wheelbase, over a whole swing."""
     swing = (stopped.time > 0.7) & (stopped.time < 1.4)
@@ -145,6 +148,7 @@ def test_braking_moves_load_to_the_front_and_makes_it_dive(stopped):
     assert np.mean(stopped["chassis.pitch"][swing]) > 0.0
 
 
+@pytest.mark.slow
 def test_brakes_hold_it_at_rest(stopped):
     """Oracle: 1.4 s after it stands the swings have died out and no torque drives it."""
     assert np.abs(stopped["chassis.v_x"][-40:]).max() < 1e-3
@@ -194,6 +198,7 @@ def test_what_it_cannot_do_is_said_before_anything_is_solved(manoeuvre, options,
         drive(CAR, manoeuvre, **options)
 
 
+@pytest.mark.slow
 def test_manoeuvre_2_lies_in_the_ranges_of_the_paper():
     """Oracle: Table 2 and Figs. 9 and 12; the first 11 s, on the smooth end of the classes.
 

@@ -66,6 +66,7 @@ def test_a_road_1_mm_higher_lifts_the_resting_car_by_1_mm():
     assert_allclose(np.delete(moved, 2, axis=1), 0.0, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_a_car_that_has_driven_1_mm_down_stands_1_mm_lower():
     """Ground, tyres and pose together, once the car has swung out; loads are those of before."""
     down = PotholeRoad(3.0, 100.0, 0.001, 1.0, "both")
