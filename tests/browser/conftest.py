@@ -16,6 +16,7 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -233,8 +234,8 @@ def service(tmp_path_factory) -> Iterator[Service]:
     service.stop()
 
 
-@pytest.fixture
-def visit(browser) -> Iterator[Callable[[], Visitor]]:
+@contextmanager
+def visits(browser: Browser) -> Iterator[Callable[..., Visitor]]:
     """Makes visitors; each has cookies, and so a session, of its own, or sits `beside` another.
 
     Drawing in software is slow: the 3D view is small, and empty in stories that are not about it.
@@ -267,6 +268,12 @@ def visit(browser) -> Iterator[Callable[[], Visitor]]:
     for context in contexts:
         context.close()
     assert complaints == []
+
+
+@pytest.fixture
+def visit(browser) -> Iterator[Callable[..., Visitor]]:
+    with visits(browser) as arrive:
+        yield arrive
 
 
 @pytest.fixture

@@ -195,6 +195,7 @@ def test_the_detailed_car_drives_and_becomes_the_session_s_car(driver):
     assert driver.look("ridetune.state('baseline')") == file
 
 
+@pytest.mark.slow
 def test_a_campaign_is_followed_on_after_the_service_has_been_away(visit, tmp_path):
     """It was killed before a worker could begin."""
     service = Service(tmp_path / "data")

@@ -56,6 +56,7 @@ def test_no_stage_of_a_recording_cuts_off_what_it_says(visitor):
     assert cut_off(visitor) == []
 
 
+@pytest.mark.slow
 def test_no_view_of_a_fit_cuts_off_what_it_says(visitor):
     """A fit from two starts, with a profile, so that every view is there; all in one row."""
     page = visitor.page

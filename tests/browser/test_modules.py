@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
+from .conftest import visits
+
 pytestmark = pytest.mark.browser
+
+
+@pytest.fixture(scope="module")
+def visitor(browser, service):
+    """On a page that all have in common: its functions keep nothing."""
+    with visits(browser) as visit:
+        yield visit().open(service.address)
 
 
 def in_module(visitor, name, body, *arguments):

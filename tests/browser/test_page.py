@@ -348,6 +348,7 @@ def test_the_3d_view_comes_back_after_a_lost_connection(spectator):
     assert changed_pixels(spectator.picture(), before) < 1e-3
 
 
+@pytest.mark.slow
 def test_the_page_goes_on_when_the_service_has_been_away(visit, tmp_path):
     service = Service(tmp_path / "data")
     try:
