@@ -126,6 +126,11 @@ def _extremes(
     return thinned
 
 
+def written(head: Mapping[str, Any], frames: Frames, form: Form) -> bytes:
+    """In one of the forms of histories: binary, else JSON."""
+    return (to_binary if form == "binary" else to_json)(head, frames)
+
+
 def to_binary(head: Mapping[str, Any], frames: Frames) -> bytes:
     """The binary form; `samples`, `channels` and `decimation` are put into the head."""
     text = _text(_complete(head, frames)).encode()

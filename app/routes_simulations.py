@@ -70,8 +70,7 @@ def _simulated(
 
 def frames_reply(head: dict[str, Any], taken: frames.Frames, form: frames.Form) -> Response:
     """Histories as binary or JSON."""
-    written = frames.to_binary if form == "binary" else frames.to_json
-    return Response(written(head, taken), media_type=frames.MEDIA_TYPE_OF[form])
+    return Response(frames.written(head, taken, form), media_type=frames.MEDIA_TYPE_OF[form])
 
 
 def csv_reply(run: Any, headers: Mapping[str, str] | None = None) -> Response:

@@ -84,8 +84,7 @@ def simulated(
         frames.take(one, request.channels, request.max_samples, request.decimate)
         for one in (found.run, *((found.bands.lower, found.bands.upper) if found.bands else ()))
     )
-    written = frames.to_binary if form == "binary" else frames.to_json
-    return written(found.head, taken.within(*ends) if ends else taken), shown
+    return frames.written(found.head, taken.within(*ends) if ends else taken, form), shown
 
 
 def plan(

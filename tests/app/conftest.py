@@ -97,6 +97,20 @@ class Visitor:
             time.sleep(0.05)
 
 
+class Clock:
+    """Seconds since the start of a test."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
 @pytest.fixture(scope="session")
 def workers() -> Iterator[str]:
     """Address of the job workers that many services share: to start some takes ten seconds."""

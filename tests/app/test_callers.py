@@ -14,20 +14,6 @@ from .conftest import ADDRESS, Visitor, open_client
 SIMULATION = {"manoeuvre": "bump", "duration": 2.0}
 
 
-class Clock:
-    """Seconds since the start of a test."""
-
-    now = 0.0
-
-    def __call__(self) -> float:
-        return self.now
-
-
-@pytest.fixture
-def clock() -> Clock:
-    return Clock()
-
-
 def test_a_bucket_gives_its_burst_and_then_its_rate(clock):
     buckets = Buckets(2.0, 3.0, clock=clock)
     assert [buckets.take("a") for _ in range(4)] == [0, 0, 0, 0.5]

@@ -13,20 +13,6 @@ from ridetune.app.store import Store, database_beside
 from .conftest import Visitor, open_client
 
 
-class Clock:
-    """Seconds since the start of a test."""
-
-    now = 0.0
-
-    def __call__(self) -> float:
-        return self.now
-
-
-@pytest.fixture
-def clock() -> Clock:
-    return Clock()
-
-
 def test_an_answer_is_remembered_for_a_moment(clock):
     answers = RecentAnswers(clock=clock)
     assert answers.recall("a") is None
