@@ -94,7 +94,8 @@ def _spectrum_response(weighting: Weighting, size: int, step: float) -> NDArray[
 
 def vibration_dose(history: Array, step: float) -> float:
     """VDV of a weighted acceleration, m/s^1.75: (integral of a^4 dt)^(1/4)."""
-    return float(trapezoid(history**4, dx=step) ** 0.25)
+    # A power of four is two squares; as a power numpy takes ten times as long over it.
+    return float(trapezoid(np.square(np.square(history)), dx=step) ** 0.25)
 
 
 def running_rms(

@@ -65,10 +65,22 @@ def metrics(run: Run) -> list[Metric]:
 
 
 def rms(time: Array, values: Array) -> float:
-    """Root of the mean square over time about the mean over time, for any sampling."""
-    span = time[-1] - time[0]
-    deviation = values - np.trapezoid(values, time) / span
-    return float(np.sqrt(np.trapezoid(deviation**2, time) / span))
+    """Root of the mean square over time about the mean over time, for any sampling.
+
+    values : (n,) or (channels, n), each about its own mean, their mean squares then averaged
+    """
+    shares = _shares_of_time(time)
+    deviation = values - (values @ shares)[..., np.newaxis]
+    return float(np.sqrt(np.mean(deviation**2 @ shares)))
+
+
+def _shares_of_time(time: Array) -> Array:
+    """Weights (n,) by which samples give their mean over time, by the trapezoidal rule."""
+    steps = np.diff(time)
+    shares = np.zeros(time.size)
+    shares[:-1] = steps
+    shares[1:] += steps
+    return shares / (2.0 * (time[-1] - time[0]))
 
 
 def comfort_word(acceleration: float) -> str:
@@ -182,7 +194,7 @@ def _travel(run: Run) -> Iterator[Metric]:
         yield Metric(
             f"suspension.{axle}.travel.rms",
             f"{label}, rms",
-            _pooled_rms(run.time, travels),
+            rms(run.time, travels),
             *units,
             "both wheels together, about their means",
         )
@@ -207,7 +219,7 @@ def _tyre_load(run: Run) -> Iterator[Metric]:
     """Variation of the tyre load, which costs grip."""
     for axle, loads in _axles(run, "tyre.{}.load".format):
         label = f"{AXLE_WORDS[axle]} tyre load"
-        variation, mean = _pooled_rms(run.time, loads), float(np.mean(loads))
+        variation, mean = rms(run.time, loads), float(np.mean(loads))
         yield Metric(
             f"tyre.{axle}.load.rms",
             f"{label} variation, rms",
@@ -263,8 +275,3 @@ def _axles(run: Run, channel_of: Callable[[str], str]) -> Iterator[tuple[AxleNam
         names = [channel_of(corner) for corner in CORNERS if axle_of(corner) == axle]
         if all(name in run for name in names):
             yield axle, np.stack([run[name] for name in names])
-
-
-def _pooled_rms(time: Array, pair: Array) -> float:
-    """Root of the mean over two channels of their mean squares about their means."""
-    return float(np.sqrt(np.mean([rms(time, values) ** 2 for values in pair])))
