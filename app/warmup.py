@@ -74,7 +74,8 @@ class WarmUp:
         try:
             self._work(self)
         except Exception:
-            log.exception("the simulation could not be compiled")
+            if not self.closed:  # what the service's end overtakes has not failed
+                log.exception("the simulation could not be compiled")
             self.state = "failed"
             self.message = (
                 "The simulation could not be compiled; the service's log has the details."

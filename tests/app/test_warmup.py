@@ -1,11 +1,12 @@
 """Kernels are made ready in the background: told, waited for, stopped with the service."""
 
+import threading
 import time
 
 import psutil
 import pytest
 from ridetune.app.compile import PARTS, load_all
-from ridetune.app.errors import Compiling
+from ridetune.app.errors import Compiling, Unavailable
 from ridetune.app.warmup import WarmUp
 from ridetune.engine.kernel_cache import is_compiled
 
@@ -31,6 +32,26 @@ def test_a_failure_is_told_and_logged(caplog):
     assert warmup.state == "failed"
     assert "log" in warmup.message
     assert "no compiler" in caplog.text
+
+
+def test_what_the_end_of_the_service_overtakes_is_not_a_failure(caplog):
+    closed, refused = threading.Event(), threading.Event()
+
+    def overtaken(*_) -> None:
+        closed.wait()
+        refused.set()
+        raise Unavailable("The service is about to end.")
+
+    warmup = WarmUp(overtaken)
+    warmup.start()
+    warmup.close()
+    closed.set()
+    assert refused.wait(10)
+    deadline = time.monotonic() + 10
+    while warmup.state == "compiling":
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    assert caplog.text == ""
 
 
 def test_a_cold_cache_is_filled_by_other_processes(monkeypatch):
