@@ -17,6 +17,11 @@ from ..engine.errors import RideError
 from . import logs
 from .lent_recordings import LentRecordings
 
+BEHIND_THE_SERVICE = 5
+"""By how much nicer than the service: what asks it for little is answered while every core
+simulates, and jobs (19) still wait for both.
+"""
+
 READY, ASKED, DONE = "ready", "asked", "done"
 REFUSED, FAILED, BROKEN = "refused", "failed", "broken"
 """What a message is; those of the simulator, and in answer to what it asked DONE or REFUSED."""
@@ -50,6 +55,7 @@ def simulator(connection: Connection) -> None:
     # Told by a terminal or a service manager, the service ends; what it still serves needs this.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    os.nice(BEHIND_THE_SERVICE)
     logs.configure_worker()
     host = Host(connection)
     with suppress(EOFError, OSError):
