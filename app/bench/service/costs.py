@@ -104,15 +104,21 @@ async def slider_move(pace: Pace) -> Measured:
         vehicle, connection = await vehicle_of(subject, visitor), Connection(subject.port)
         for number in range(20):
             await connection.wanted(move(visitor, vehicle, number))
-        count, began, spent = 0, time.perf_counter(), subject.own_processor
+        count, began = 0, time.perf_counter()
+        spent, own = subject.processor, subject.own_processor
         until, size = began + pace.seconds / 3, 0
         while time.perf_counter() < until:
             size = len((await connection.wanted(move(visitor, vehicle, count))).body)
             count += 1
-        took, spent = time.perf_counter() - began, subject.own_processor - spent
+        took, spent, own = (
+            time.perf_counter() - began,
+            subject.processor - spent,
+            subject.own_processor - own,
+        )
         connection.close()
     figures = (
         Figure("processor", spent / count, "s"),
+        Figure("of which the serving process", own / count, "s"),
         Figure("request to reply", took / count, "s"),
         Figure("reply", size, "B"),
     )
