@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..engine.remembered import Remembered
@@ -31,7 +31,7 @@ class LentRecordings:
 
     def run(self, measurement: Measurement) -> Run:
         """The recording as it is used."""
-        known = json.dumps(asdict(measurement), sort_keys=True)
+        known = json.dumps(vars(measurement), sort_keys=True)
         return self._runs.made(known, lambda: self._ask(measurement), size)
 
     def motion(
