@@ -118,10 +118,12 @@ def create_app(
         generate_unique_id_function=operation_id,
         lifespan=lifespan,
     )
+    # Routes are looked for in this order: first what is asked for most.
     for part in (
-        routes_catalogue,
-        routes_sessions,
+        routes_health,
         routes_simulations,
+        routes_sessions,
+        routes_catalogue,
         routes_measurements,
         routes_conditioning,
         routes_mappings,
@@ -132,7 +134,6 @@ def create_app(
         routes_advice,
         routes_campaigns,
         routes_page,
-        routes_health,
         routes_metrics,
     ):
         app.include_router(part.router)
