@@ -117,55 +117,59 @@ def _corner_output(corner, chassis, seen, c_dd, arm_dd, force_X, force_Z, road, 
 
 
 @inlined
-def _keep_car(out, buffer, c_dd):
+def _keep_car(out, samples, sample, buffer, c_dd):
     """Outputs of the whole car after its slopes have been found."""
     traction, front, rear = buffer[TRACTION], buffer[BARS + 1], buffer[BARS + 3]
-    store_car(out, 0, 1, 0, CarOutput(c_dd.x, c_dd.z, c_dd.pitch, c_dd.roll, traction, front, rear))
+    found = CarOutput(c_dd.x, c_dd.z, c_dd.pitch, c_dd.roll, traction, front, rear)
+    store_car(out, 0, samples, sample, found)
 
 
 @inlined
-def _keep_corner(out, wheel, found):
+def _keep_corner(out, samples, sample, wheel, found):
     """Outputs of one wheel."""
-    store_corner(out, CORNER + wheel * CORNER_SIZE, 1, 0, found)
+    store_corner(out, CORNER + wheel * CORNER_SIZE, samples, sample, found)
 
 
 @compiled
 def observe_free(car, states, inputs, road, start, spacing, out):
     """Outputs of one car in the road and posts modes.
 
-    car (CAR_ROWS,), states (n, 16), inputs (n, 16) as of `integrate_free`, out (n, OUTPUTS)
+    car (CAR_ROWS,), states (n, 16), inputs (n, 16) as of `integrate_free`; out (OUTPUTS, n), in
+    which a channel lies in one piece
     """
-    buffer = np.zeros(ROWS)
+    buffer, kept, samples = np.zeros(ROWS), out.reshape(-1), states.shape[0]
     take_car(buffer, 1, 0, car)
     driven = (road, start, spacing)
-    for i in range(states.shape[0]):
+    for i in range(samples):
         buffer[STAGE : STAGE + STATES] = states[i]
         free_slopes(buffer, 1, inputs[i], driven)
         state, chassis = chassis_at(buffer, 1, 0)
         c, way = load_quad(buffer, SLOPE + 8, 1, 0), direction_of_travel(state.x_rate)
-        _keep_car(out[i], buffer, c)
+        _keep_car(kept, samples, i, buffer, c)
         for w in range(4):
             corner, seen = corner_of(buffer, 4, w), corner_at(buffer, 4, w, state, chassis, way)
             arm_dd, ground = buffer[SLOPE + 12 + w], given_to(buffer, 4, w).road
             found = _corner_output(
                 corner, chassis, seen, c, arm_dd, seen.force_X, seen.load, ground, 1.0
             )
-            _keep_corner(out[i], w, found)
+            _keep_corner(kept, samples, i, w, found)
 
 
 @compiled
 def observe_rims(car, states, inputs, exact, out):
-    """Outputs of one car in the rims mode; inputs (n, 15) as of `integrate_rims`."""
-    buffer = np.zeros(ROWS)
+    """Outputs of one car in the rims mode; inputs (n, 15) as of `integrate_rims`, the rest as of
+    `observe_free`.
+    """
+    buffer, kept, samples = np.zeros(ROWS), out.reshape(-1), states.shape[0]
     take_car(buffer, 1, 0, car)
     driven = (exact,)
-    for i in range(states.shape[0]):
+    for i in range(samples):
         buffer[STAGE : STAGE + STATES] = states[i]
         u = inputs[i]
         rim_slopes(buffer, 1, u, driven)
         state, chassis = chassis_at(buffer, 1, 0)
         c, way, b = load_quad(buffer, SLOPE + 8, 1, 0), direction_of_travel(u[13]), u[14]
-        _keep_car(out[i], buffer, c)
+        _keep_car(kept, samples, i, buffer, c)
         for w in range(4):
             corner = corner_of(buffer, 4, w)
             arm, reach = rim_arm_at(buffer, w)
@@ -176,4 +180,4 @@ def observe_rims(car, states, inputs, exact, out):
             force_X = share * buffer[TRACTION] - seen.resistance * load
             arm_dd = bent(seen.bend, c)
             found = _corner_output(corner, chassis, seen, c, arm_dd, force_X, load, np.nan, reach)
-            _keep_corner(out[i], w, found)
+            _keep_corner(kept, samples, i, w, found)
