@@ -38,3 +38,10 @@ class Buckets:
             if len(self._levels) > self._kept:
                 self._levels.popitem(last=False)
         return lacking / self._rate
+
+    def put_back(self, key: Hashable, tokens: float = 1.0) -> None:
+        """What was taken and not used after all."""
+        with self._lock:
+            if key in self._levels:
+                level, since = self._levels[key]
+                self._levels[key] = min(self._burst, level + min(tokens, self._burst)), since

@@ -40,16 +40,30 @@ class Callers:
             "Many browsers were let in from where you are within a minute; try again in {}.",
         )
 
-    def simulate(self, session: str, user: str | None, seconds: float) -> None:
-        """Take simulated seconds from a session's budget, and from its user's if known."""
+    def simulating(self, session: str, user: str | None) -> Callable[[float], None]:
+        """What takes a request's simulated seconds from a session's budget, and from its user's if
+        known; asked again, because a process was lost with the work, it takes no more.
+        """
+        taken = False
+
+        def take(seconds: float) -> None:
+            nonlocal taken
+            if not taken:
+                self._take_simulated(session, user, seconds)
+                taken = True
+
+        return take
+
+    def _take_simulated(self, session: str, user: str | None, seconds: float) -> None:
         _refuse(
             self._simulated.take(session, seconds),
             "The session has used up its simulated seconds for now; more are there in {}. Sweeps "
             "and identifications go on.",
         )
-        if user is not None:
+        if user is not None and (wait := self._simulated_of_users.take(user, seconds)):
+            self._simulated.put_back(session, seconds)
             _refuse(
-                self._simulated_of_users.take(user, seconds),
+                wait,
                 "You have used up your simulated seconds of all your sessions for now; more are "
                 "there in {}. Sweeps and identifications go on.",
             )

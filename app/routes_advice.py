@@ -19,7 +19,6 @@ router = APIRouter(prefix="/api/sessions/{sid}/advice", tags=["advice"], route_c
 @router.post("")
 async def advise(sid: SessionId, services: Shared, body: AdviceRequest) -> Mapping[str, Any]:
     """Rank manoeuvres by what they would do to the weakest parameters."""
-    services.warmup.require()
     return await services.interactive.run(sid, lambda: _advice(services, sid, body))
 
 

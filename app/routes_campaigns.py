@@ -47,7 +47,6 @@ router = job_router("campaigns", VIEW)
 @router.post("", status_code=202)
 async def submit(sid: SessionId, services: Shared, body: CampaignRequest) -> dict[str, Any]:
     """Queue a campaign; the same `key` again gives the same job."""
-    services.warmup.require()
     return await submitted(
         services, sid, VIEW, body.key, lambda: as_asked(body), lambda: _spec(services, sid, body)
     )

@@ -37,7 +37,6 @@ async def simulate(
 ) -> Response:
     """Simulate a manoeuvre, a recording's wheel motion or a rig test."""
     form = frames.form_of(request.headers.get("accept"))
-    services.warmup.require()
     user = user_who_opened(request)
     return await services.interactive.run(sid, lambda: _simulated(services, sid, user, body, form))
 
@@ -59,7 +58,7 @@ def _simulated(
         recording_of(body, sid, store),
         fit,
         services.settings.limits,
-        charge=lambda seconds: services.callers.simulate(sid, user, seconds),
+        charge=services.callers.simulating(sid, user),
     )
     if shown is not None and services.viewers is not None:
         services.viewers.show(sid, shown)

@@ -43,7 +43,6 @@ router = job_router("sweeps", VIEW)
 @router.post("", status_code=202)
 async def submit(sid: SessionId, services: Shared, body: SweepRequest) -> dict[str, Any]:
     """Queue a sweep; the same `key` again gives the same job."""
-    services.warmup.require()
     return await submitted(
         services, sid, VIEW, body.key, lambda: as_asked(body), lambda: _spec(services, sid, body)
     )

@@ -31,7 +31,6 @@ router = job_router("validations", VIEW)
 @router.post("", status_code=202)
 async def submit(sid: SessionId, services: Shared, body: ValidationRequest) -> dict[str, Any]:
     """Queue a validation of an identification; the same `key` again gives the same job."""
-    services.warmup.require()
     return await submitted(
         services, sid, VIEW, body.key, lambda: as_asked(body), lambda: _spec(services, sid, body)
     )

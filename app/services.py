@@ -71,8 +71,10 @@ class Services:
         self, sid: str, work: Callable[..., T], *given: Any, **answers: Callable[..., Any]
     ) -> T:
         """Result of `work(host, *given)` in a simulator, for a session; on a thread of the pool for
-        interactive work. `answers` are what the work may ask for besides recordings.
+        interactive work. `answers` are what the work may ask for besides recordings. Refused while
+        the kernels are not there.
         """
+        self.warmup.require()
         return self.simulators.run(sid, work, *given, recording=self.recordings.run, **answers)
 
 

@@ -161,13 +161,14 @@ def _metric(metric: Metric, within: "Bands | None") -> dict[str, Any]:
     return told if interval is None else {**told, "interval": list(interval)}
 
 
-_VEHICLES: Remembered[str, Vehicle] = Remembered(256)
-"""Checked vehicles by their JSON."""
+_VEHICLES: Remembered[str, Vehicle] = Remembered(1_000_000)
+"""Checked vehicles by their JSON, up to so many characters of it."""
 
 
 def _vehicle(data: Mapping[str, Any], values: Mapping[str, float]) -> Vehicle:
     # A slider sends the same car again and again with other values.
-    vehicle = _VEHICLES.made(json.dumps(data), lambda: vehicle_from_json(data), lambda _: 1)
+    known = json.dumps(data)
+    vehicle = _VEHICLES.made(known, lambda: vehicle_from_json(data), lambda _: len(known))
     return vehicle.with_values(values) if values else vehicle
 
 

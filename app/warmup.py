@@ -12,7 +12,7 @@ from typing import Literal
 
 from ..engine.kernel_cache import is_compiled
 from .compile import PARTS, start_compilers
-from .errors import Compiling
+from .errors import Compiling, Unavailable
 from .samples import sample_project
 from .simulators import Simulators
 
@@ -22,18 +22,21 @@ LOADING = "Loading the compiled model; a matter of seconds."
 
 FIRST_START = "Compiling the model; the first start takes half a minute, or somewhat more."
 
+RETRY_AFTER = 30
+"""s after which what failed is tried again."""
+
 State = Literal["compiling", "ready", "failed"]
 
 
 class WarmUp:
-    """Does its work once, in a thread of its own, and says how far it is."""
+    """Does its work in a thread of its own, and says how far it is."""
 
     def __init__(self, work: "Callable[[WarmUp], object]"):
         self._work = work
         self.state: State = "compiling"
         self.message = LOADING
         self._ended = threading.Event()
-        self.closed = False
+        self._closing = threading.Event()
         self._apart: list[subprocess.Popen[bytes]] = []
         self._thread = threading.Thread(target=self._run, name="warm-up", daemon=True)
 
@@ -49,15 +52,22 @@ class WarmUp:
         """Refuse work that needs the kernels while they are not there."""
         if self.state == "compiling":
             raise Compiling(self.message, retry_after=1)
+        if self.state == "failed":
+            raise Unavailable(self.message, retry_after=RETRY_AFTER)
 
     def wait(self) -> bool:
-        """Wait for the end; False if the service stops before it."""
+        """Wait until it has succeeded or failed; False if the service stops before it."""
         self._ended.wait()
         return not self.closed
 
+    @property
+    def closed(self) -> bool:
+        """Whether nobody waits for it any more."""
+        return self._closing.is_set()
+
     def close(self) -> None:
         """Stop waiting for it."""
-        self.closed = True
+        self._closing.set()
         for compiler in self._apart:
             compiler.kill()
         self._ended.set()
@@ -71,18 +81,27 @@ class WarmUp:
         self.tell(LOADING)
 
     def _run(self) -> None:
+        """Until it succeeds: what it lacked, memory for one, may be there later."""
+        while not self._succeeded():
+            self._ended.set()
+            if self._closing.wait(RETRY_AFTER):
+                return
+        self.state, self.message = "ready", "Ready."
+        self._ended.set()
+
+    def _succeeded(self) -> bool:
         try:
             self._work(self)
         except Exception:
             if not self.closed:  # what the service's end overtakes has not failed
-                log.exception("the simulation could not be compiled")
+                log.exception("the simulation could not be made ready")
             self.state = "failed"
             self.message = (
-                "The simulation could not be compiled; the service's log has the details."
+                "The simulation could not be made ready, which is tried again every "
+                f"{RETRY_AFTER:g} s; the service's log has the details."
             )
-        else:
-            self.state, self.message = "ready", "Ready."
-        self._ended.set()
+            return False
+        return True
 
 
 def ready_to_simulate(warmup: WarmUp, simulators: Simulators) -> None:

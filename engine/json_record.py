@@ -20,6 +20,9 @@ from .vehicle import Range
 
 LONGEST_LIST = 100_000
 
+MOST_TEXT = 10_000
+"""Characters of a text."""
+
 
 class RecordReader:
     """Builds records; `source` heads every message, which is raised as `error`."""
@@ -72,6 +75,10 @@ class RecordReader:
         if not _fits(hint, data):
             wanted = expected(hint, accepted)
             raise self.refuse(path, f"is {describe(data)}, but must be {wanted}; correct it.")
+        if isinstance(data, str) and len(data) > MOST_TEXT:
+            raise self.refuse(
+                path, f"has {len(data)} characters, at most {MOST_TEXT} are taken; shorten it."
+            )
         if hint not in (float, int):
             return data
         number = _to_float(data)

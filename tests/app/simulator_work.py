@@ -17,6 +17,10 @@ def asked(host, what, *about):
     return host.ask(what, *about)
 
 
+def length(host, data):
+    return len(data)
+
+
 def run_of(host, measurement):
     return host.recordings.run(measurement)
 

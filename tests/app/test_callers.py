@@ -98,25 +98,43 @@ def test_a_session_has_its_simulated_seconds(tmp_path):
 
 def test_simulated_seconds_come_back_within_the_hour(clock):
     callers = Callers(Limits(session_simulated_seconds=3600), clock)
-    callers.simulate("a", None, 3600)
+    callers.simulating("a", None)(3600)
     with pytest.raises(Busy, match="10 minutes"):
-        callers.simulate("a", None, 600)
+        callers.simulating("a", None)(600)
     clock.now = 600.0
-    callers.simulate("a", None, 600)
+    callers.simulating("a", None)(600)
 
 
 def test_a_user_has_simulated_seconds_in_all_sessions_together(clock):
     """Another user, and who is not known by name, has as many as ever."""
     callers = Callers(Limits(user_simulated_seconds=3600), clock)
-    callers.simulate("a", "key:rig", 1800)
-    callers.simulate("b", "key:rig", 1800)
+    callers.simulating("a", "key:rig")(1800)
+    callers.simulating("b", "key:rig")(1800)
     with pytest.raises(Busy, match="all your sessions .* in 30 minutes") as refused:
-        callers.simulate("c", "key:rig", 1800)
+        callers.simulating("c", "key:rig")(1800)
     assert refused.value.headers == {"Retry-After": "1800"}
-    callers.simulate("c", "key:bench", 1800)
-    callers.simulate("c", None, 1800)
+    callers.simulating("c", "key:bench")(1800)
+    callers.simulating("c", None)(1800)
     clock.now = 1800.0
-    callers.simulate("a", "key:rig", 1800)
+    callers.simulating("a", "key:rig")(1800)
+
+
+def test_who_is_refused_as_a_user_loses_nothing_of_the_session(clock):
+    callers = Callers(Limits(session_simulated_seconds=100, user_simulated_seconds=60), clock)
+    callers.simulating("a", "key:rig")(60)
+    with pytest.raises(Busy, match="all your sessions"):
+        callers.simulating("b", "key:rig")(60)
+    callers.simulating("b", None)(100)
+
+
+def test_work_that_is_done_again_is_taken_once(clock):
+    callers = Callers(Limits(session_simulated_seconds=100), clock)
+    take = callers.simulating("a", None)
+    take(60)
+    take(60)
+    callers.simulating("a", None)(40)
+    with pytest.raises(Busy):
+        callers.simulating("a", None)(1)
 
 
 def test_the_sessions_of_a_key_share_its_simulated_seconds(tmp_path):

@@ -291,6 +291,9 @@ def test_while_the_kernels_compile_simulations_wait_and_the_rest_works(settings)
         waiting = visitor.post("/simulations", json={})
         assert (waiting.status_code, waiting.json()["code"]) == (503, "compiling")
         assert waiting.headers["retry-after"] == "1"
+        runs = [one["id"] for one in visitor.get("/measurements").json()]
+        waiting = visitor.post("/identifications", json={"runs": runs})
+        assert (waiting.status_code, waiting.json()["code"]) == (503, "compiling")
         ready = client.get("/readyz")
         assert (ready.status_code, ready.json()["state"]) == (503, "compiling")
         assert client.get("/healthz").status_code == 200

@@ -1,10 +1,12 @@
 """Processes that simulate: what they give back, what they ask, and what losing one costs."""
 
+import errno
 import os
 import pickle
 import signal
 import subprocess
 import sys
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -168,17 +170,60 @@ def test_work_that_ends_its_process_is_refused_and_nothing_else(two):
     assert two.run("a", work.told_to_end) == "done"
 
 
-def test_one_that_is_silent_is_replaced(two, monkeypatch):
-    """Stopped, not ended: once patience is at its end it is killed, and the next one works."""
-    before, _ = two.run("a", work.process)
-    monkeypatch.setattr(module, "PATIENCE", 0.2)
+@pytest.mark.parametrize("size", [10, 10_000_000], ids=["that is taken", "that is not"])
+def test_one_that_is_silent_is_replaced(monkeypatch, size):
+    """Stopped, not ended, whether the socket takes what it is told or not: once patience is at its
+    end it is killed, and the next one works.
+    """
     monkeypatch.setattr(module, "ENDING", 0.1)
-    os.kill(before, signal.SIGSTOP)
-    with pytest.raises(Unavailable):
-        two.run("a", work.process)
-    assert not psutil.pid_exists(before) or psutil.Process(before).status() == "zombie"
-    monkeypatch.undo()
-    assert two.run("a", work.process)[0] != before
+    impatient = Simulators(1, patience=1.0)
+    try:
+        before, _ = impatient.run("a", work.process)
+        os.kill(before, signal.SIGSTOP)
+        with pytest.raises(Unavailable):
+            impatient.run("a", work.length, bytes(size))
+        assert not psutil.pid_exists(before) or psutil.Process(before).status() == "zombie"
+        assert impatient.lost == 1
+        assert impatient.run("a", work.process)[0] != before
+    finally:
+        impatient.close()
+
+
+def test_what_broke_off_is_not_taken_for_the_next_answer():
+    """An answer that cannot be sent: the simulator still waits for it, and is replaced."""
+    one = Simulators(1)
+    try:
+        before, _ = one.run("a", work.process)
+        with pytest.raises(Exception, match="pickle"):
+            one.run("a", work.asked, "lock", lock=threading.Lock)
+        assert one.run("b", work.length, b"four") == 4
+        assert one.run("b", work.process)[0] != before
+        assert one.lost == 1
+    finally:
+        one.close()
+
+
+def test_one_that_cannot_be_started_is_told(two, monkeypatch):
+    """As where too many files are open; later it can."""
+
+    def too_many():
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    with monkeypatch.context() as without:
+        without.setattr(module.processes, "Pipe", too_many)
+        with pytest.raises(Unavailable, match=r"^A process that simulates could not") as refused:
+            two.run("a", work.process)
+    assert refused.value.headers == {"Retry-After": "5"}
+    assert two.lost == 0
+    assert two.run("a", work.length, b"four") == 4
+
+
+def test_one_that_ends_at_its_start_is_told(two, monkeypatch):
+    with monkeypatch.context() as without:
+        without.setattr(module, "simulator", os._exit)
+        with pytest.raises(Unavailable, match=r"^A process that simulates could not"):
+            two.run("a", work.process)
+    assert two.run("a", work.length, b"four") == 4
 
 
 def test_closed_they_are_gone_and_begin_no_more(two):

@@ -5,6 +5,7 @@ import time
 
 import psutil
 import pytest
+from ridetune.app import warmup as module
 from ridetune.app.compile import PARTS, load_all
 from ridetune.app.errors import Compiling, Unavailable
 from ridetune.app.warmup import WarmUp
@@ -32,6 +33,27 @@ def test_a_failure_is_told_and_logged(caplog):
     assert warmup.state == "failed"
     assert "log" in warmup.message
     assert "no compiler" in caplog.text
+    with pytest.raises(Unavailable, match="could not be made ready") as refused:
+        warmup.require()
+    assert refused.value.headers == {"Retry-After": "30"}
+    warmup.close()
+
+
+def test_what_failed_is_tried_again(monkeypatch):
+    monkeypatch.setattr(module, "RETRY_AFTER", 0.01)
+    lacking = [MemoryError(), MemoryError()]
+
+    def works_the_third_time(*_) -> None:
+        if lacking:
+            raise lacking.pop()
+
+    warmup = WarmUp(works_the_third_time)
+    warmup.start()
+    deadline = time.monotonic() + 10
+    while warmup.state != "ready":
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    warmup.require()
 
 
 def test_what_the_end_of_the_service_overtakes_is_not_a_failure(caplog):

@@ -173,6 +173,7 @@ def _set(data, path, value):
         ("front.wheel.cg_offset", [0, 0], "cg_offset has 2 values, but must have 3"),
         ("front.wheel.cg_offset", [0, 0, 9], r"cg_offset[2] is 9, but must lie between -1 and 1 m"),
         ("name", 3, "name is 3, but must be a text"),
+        ("name", 10_001 * "x", "name has 10001 characters, at most 10000 are taken; shorten it"),
         ("front", [], "front must be an object {...}, not a list"),
     ],
 )
