@@ -31,6 +31,12 @@ _INVALIDATION = 0b10
 """Flag of a channel of MDF 4 that has a bit for invalid samples."""
 
 
+PACKED = 1032
+"""How many times shorter deflate makes what says nothing; asammdf takes memory for whole records
+before it looks whether they are there.
+"""
+
+
 class MdfFile(Table):
     """An MDF file of either version."""
 
@@ -40,6 +46,7 @@ class MdfFile(Table):
         self.source, self.kind = source, kind
         self._file: Any = MDF(path)
         self._version = 3 if kind == "MDF3" else 4
+        self._most_in_a_record = PACKED * path.stat().st_size
         listing = Listing(source, kind)
         for number in range(len(self._file.groups)):
             self._list(listing, number)
@@ -55,6 +62,10 @@ class MdfFile(Table):
         )
         label = named or f"group {number + 1}"
         if samples == 0:
+            return
+        if group.channel_group.samples_byte_nr > self._most_in_a_record:
+            for channel in group.channels:
+                listing.leave_out(plain(channel.name), "lies in records longer than the file")
             return
         master, clock = self._file.masters_db.get(number), None
         if master is not None and self._is_clock(group.channels[master], group.channel_group):

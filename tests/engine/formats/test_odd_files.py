@@ -4,6 +4,7 @@ Oracle: what was written beside the oddity, and what was done to the file.
 """
 
 import io
+import struct
 
 import h5py
 import numpy as np
@@ -109,6 +110,17 @@ def test_a_channel_of_mdf_outside_its_record_is_left_out(tmp_path, spoilt, name,
     column, values = by_name(found)["a_x"]
     assert_allclose(values[4:], files.A_X[4:])
     assert (column.clock is None) == (spoilt == "time")
+
+
+def test_records_of_mdf_that_are_longer_than_the_file_are_not_made_room_for(tmp_path):
+    """A length of 4.7 MB where 24 bytes are: asammdf would take 1.8 GB for it."""
+    path = tmp_path / "r.mf4"
+    mdf(path, "4.10")
+    data = bytearray(path.read_bytes())
+    struct.pack_into("<I", data, data.index(b"##CG") + 96, 4_670_243)
+    path.write_bytes(data)
+    with pytest.raises(MeasurementError, match="time, chassis.z, a_x lies in records longer than"):
+        table(path, "MDF4")
 
 
 def test_what_is_left_out_shifts_no_clock(tmp_path):
