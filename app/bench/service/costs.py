@@ -131,8 +131,9 @@ async def identify(pace: Pace) -> Measured:
         await subject.ready()
         visitor = await subject.visitor()
         asked = await identification(subject, visitor)
+        simulators = subject.memory - subject.own_memory
         await ended(subject, visitor, "identifications", asked)
-        workers = subject.memory - subject.own_memory
+        workers = subject.memory - subject.own_memory - simulators
         began, spent = time.perf_counter(), subject.processor
         for _ in range(pace.repetitions):
             await ended(subject, visitor, "identifications", asked)
