@@ -79,9 +79,11 @@ def _tried(
     killed: Counter[str] = Counter()
     ready: list[float] = []
     strays: list[str] = []
-    for number in range(options.kills):
+    turn = 0
+    while killed.total() < options.kills:
         time.sleep(chance.uniform(0.2, options.seconds))
-        target = targets[number % len(targets)]
+        target = targets[turn % len(targets)]
+        turn += 1
         before = service.tree() + (cluster.tree() if cluster else [])
         if target == "service group":
             service.kill_group()
