@@ -22,25 +22,14 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from . import logs, worker
+from .dask_connection import ANSWER, DaskConnection
 from .errors import Unavailable
 from .settings import Certificates
 
 log = logging.getLogger(__name__)
 
 LOOK_EVERY = 2.0
-"""Time between two looks at a scheduler elsewhere, s; it has as long to connect."""
-
-ANSWER = 5.0
-"""Time that a scheduler, or what it asks its workers, has for an answer, s."""
-
-CONFIGURATION = {
-    # The default of 15 s drops a nanny for good whose worker is lost twice in that time.
-    "distributed.deploy.lost-worker-timeout": "365d",
-    "distributed.scheduler.allowed-failures": 2,
-    # Its web servers start in any case: without pages to show, and not on a port others may want.
-    "distributed.scheduler.http.routes": [],
-    "distributed.worker.http.routes": [],
-}
+"""Time between two looks at a scheduler elsewhere, s."""
 
 
 class Listener(Protocol):
@@ -95,9 +84,8 @@ class Cluster:
         self._tasks: dict[str, _Task] = {}
         self._submissions = 0
         self._token = secrets.token_hex(4)
-        self._client: Any = None
+        self._connection: DaskConnection | None = None
         self._scheduler, self._there, self._looked = "", 0, 0.0
-        self._local: Any = None
         self._leave: threading.Timer | None = None
         self._closed = False
         self.became: Counter[str] = Counter()
@@ -185,6 +173,11 @@ class Cluster:
                 wait([_tell_workers(self._client, worker.ask_to_stop, *keys)], ANSWER)
             self._stop()
 
+    @property
+    def _client(self) -> Any:
+        connection = self._connection
+        return None if connection is None else connection.client
+
     def _started(self) -> Any:
         if self._leave is not None:
             self._leave.cancel()
@@ -192,16 +185,17 @@ class Cluster:
             self._look()
         if self._client is None:
             try:
-                self._client = self._start()
+                connection = self._connection = DaskConnection(
+                    self._address, self._certificates, self._workers, self._scratch
+                )
             except (OSError, RuntimeError) as error:
-                self._disconnect()
                 where = f"at {self._address}" if self._address else "on this machine"
                 log.error("cannot start or reach the job workers %s: %s", where, error)
                 raise Unavailable(
                     f"The job workers {where} cannot be started or reached; try again later or "
                     "look at the service's log."
                 ) from None
-            self._client.subscribe_topic(worker.TOPIC, self._heard)
+            connection.client.subscribe_topic(worker.TOPIC, self._heard)
             if self._address:
                 self._look()
         return self._client
@@ -225,34 +219,6 @@ class Cluster:
             return
         self._looked, self._scheduler, self._there = now, seen["id"], seen["total_threads"]
 
-    def _start(self) -> Any:
-        from dask import config
-        from distributed import Client, LocalCluster
-
-        config.set(CONFIGURATION)
-        logging.getLogger("distributed").setLevel(logging.ERROR)
-        logs.adopt("distributed")
-        if self._address:
-            return Client(
-                self._address,
-                security=_security(self._certificates),
-                set_as_default=False,
-                name="ridetune",
-                timeout=LOOK_EVERY,
-            )
-        no_dashboard: Any = None
-        self._local = LocalCluster(
-            n_workers=self._workers,
-            threads_per_worker=1,
-            processes=True,
-            security=True,
-            dashboard_address=no_dashboard,
-            scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
-            local_directory=str(self._scratch),
-            silence_logs=logging.ERROR,
-        )
-        return Client(self._local, set_as_default=False, name="ridetune")
-
     def _stop(self) -> None:
         self._disconnect()
         self._tasks.clear()
@@ -261,13 +227,10 @@ class Cluster:
         """Let go of the client; tasks that it still had are told to be lost."""
         if self._leave is not None:
             self._leave.cancel()
-        client, local = self._client, self._local
-        self._client = self._local = None
+        connection, self._connection = self._connection, None
         self._scheduler, self._looked = "", 0.0
-        if client is not None:
-            client.close(timeout=ANSWER)
-        if local is not None:
-            local.close()
+        if connection is not None:
+            connection.close()
 
     def _heard(self, event: tuple[float, dict[str, Any]]) -> None:
         news = event[1]
@@ -336,20 +299,6 @@ def _tell_workers(client: Any, function: Any, *values: Any, **where: Any) -> Fut
             log.warning("job workers do not answer: %r", error)
 
     return asyncio.run_coroutine_threadsafe(told(), client.loop.asyncio_loop)
-
-
-def _security(certificates: Certificates | None) -> Any:
-    """What Dask calls the files, and that it must do nothing without them."""
-    from distributed import Security
-
-    if certificates is None:
-        return None
-    return Security(
-        tls_ca_file=str(certificates.ca),
-        tls_client_cert=str(certificates.certificate),
-        tls_client_key=str(certificates.key),
-        require_encryption=True,
-    )
 
 
 def _ending_of(task: _Task, future: Any) -> worker.Ending | None:

@@ -347,3 +347,16 @@ def test_workers_that_cannot_be_reached_are_a_sentence(tmp_path, heard, monkeypa
         with pytest.raises(Unavailable, match=r"tcp://127\.0\.0\.1:9"):
             cluster.submit("lost", tasks.double, 1, heard)
         cluster.close()
+
+
+def test_a_scheduler_that_stays_away_costs_no_more_each_time_it_is_tried(tmp_path, monkeypatch):
+    """Neither threads nor open files, however long that lasts."""
+    monkeypatch.setattr("ridetune.app.dask_connection.CONNECT", 0.2)
+    cluster = Cluster("tcp://127.0.0.1:9", tmp_path)
+    assert is_away(cluster)  # Dask has threads that all its clients share
+    threads, files = threading.active_count(), psutil.Process().num_fds()
+    for _ in range(3):
+        assert is_away(cluster)
+    assert threading.active_count() <= threads
+    assert psutil.Process().num_fds() <= files
+    cluster.close()
