@@ -92,9 +92,9 @@ class Cluster:
         """How many tasks were submitted, and how many were done, failed, cancelled or lost."""
 
     def workers(self) -> int:
-        """How many there are now; 0 while none are needed."""
+        """How many there are now; 0 while none are needed, or can be reached."""
         client = self._client
-        if client is None:
+        if client is None or client.status != "running":
             return 0
         return len(client.sync(client.scheduler.ncores, callback_timeout=1))
 
@@ -116,7 +116,8 @@ class Cluster:
         kept: Mapping[str, bytes] | None = None,
         priority: int = 0,
     ) -> None:
-        """Run a task once; blocks while the cluster starts, Unavailable where it does not.
+        """Run a task once; blocks while the cluster starts, Unavailable where it does not. Any
+        other exception is the task's: it cannot be sent.
 
         kept : parts of its work that are done already
         priority : tasks of a higher one are taken up first
@@ -126,26 +127,25 @@ class Cluster:
                 return
             client = self._started()
             self._submissions += 1
-            self.became["submitted"] += 1
             # Of this service alone: another may have the same task at the same scheduler.
             key = f"{name}-{self._token}-{self._submissions}"
             known = self._tasks[name] = _Task(listener, key)
-            with warnings.catch_warnings():
-                # Recordings travel with their task so that a lost worker costs nothing but time.
-                warnings.filterwarnings("ignore", "Sending large graph", UserWarning)
-                future = client.submit(
-                    worker.run,
-                    name,
-                    key,
-                    task,
-                    payload,
-                    dict(kept or {}),
-                    key=key,
-                    pure=False,
-                    priority=priority,
+            try:
+                known.future = _given(
+                    client, key, priority, (name, key, task, payload, dict(kept or {}))
                 )
-            known.future = future
-        future.add_done_callback(lambda done: self._ended(name, done))
+                if client.status != "running":
+                    raise ConnectionError("what the client was given last may be lost")
+            except Exception as error:
+                del self._tasks[name]
+                if client.status == "running":
+                    self._leave_later()
+                    raise
+                log.warning("lost the workers %s: %r", self._where, error)
+                self._disconnect()
+                raise self._unavailable() from None
+            self.became["submitted"] += 1
+        known.future.add_done_callback(lambda done: self._ended(name, done))
 
     def cancel(self, name: str, grace: float) -> None:
         """Ask a task to stop, and return at once; after `grace` seconds kill its worker."""
@@ -179,39 +179,56 @@ class Cluster:
         return None if connection is None else connection.client
 
     def _started(self) -> Any:
+        """The client, connected anew where that before is lost; Unavailable where it cannot be."""
         if self._leave is not None:
             self._leave.cancel()
-        if self._client is not None and self._address:
+        if self._connection is not None:
             self._look()
-        if self._client is None:
-            try:
-                connection = self._connection = DaskConnection(
-                    self._address, self._certificates, self._workers, self._scratch
-                )
-            except (OSError, RuntimeError) as error:
-                where = f"at {self._address}" if self._address else "on this machine"
-                log.error("cannot start or reach the job workers %s: %s", where, error)
-                raise Unavailable(
-                    f"The job workers {where} cannot be started or reached; try again later or "
-                    "look at the service's log."
-                ) from None
-            connection.client.subscribe_topic(worker.TOPIC, self._heard)
-            if self._address:
-                self._look()
+        if self._connection is None:
+            self._connect()
+            self._look()
+        if self._connection is None:
+            raise self._unavailable()
         return self._client
 
+    def _connect(self) -> None:
+        try:
+            self._connection = DaskConnection(
+                self._address, self._certificates, self._workers, self._scratch
+            )
+            self._client.subscribe_topic(worker.TOPIC, self._heard)
+        except Exception as error:
+            unforeseen = not isinstance(error, OSError | RuntimeError)
+            log.error("cannot reach the workers %s: %s", self._where, error, exc_info=unforeseen)
+            self._disconnect()
+            raise self._unavailable() from None
+
+    @property
+    def _where(self) -> str:
+        return f"at {self._address}" if self._address else "on this machine"
+
+    def _unavailable(self) -> Unavailable:
+        return Unavailable(
+            f"The job workers {self._where} cannot be started or reached; try again later or look "
+            "at the service's log."
+        )
+
     def _look(self) -> None:
-        """Count the workers of a scheduler elsewhere; give up a client whose scheduler is gone or
-        another one since: Dask's goes on with that, but hears nothing of tasks.
+        """Give up a client that has closed itself, as Dask's does while a scheduler is away, and
+        one whose scheduler is gone or another one since: it goes on with that, but hears nothing of
+        tasks. Count the workers of a scheduler elsewhere.
         """
-        now = time.monotonic()
-        if now - self._looked < LOOK_EVERY:
+        now, client = time.monotonic(), self._client
+        if client.status != "running":
+            log.warning("lost the workers %s: the client is %s", self._where, client.status)
+            self._disconnect()
             return
-        client = self._client
+        if not self._address or now - self._looked < LOOK_EVERY:
+            return
         try:
             seen = client.sync(client.scheduler.identity, n_workers=0, callback_timeout=ANSWER)
-        except (OSError, RuntimeError) as error:
-            log.warning("lost the scheduler at %s: %s", self._address, error)
+        except Exception as error:  # of many kinds where the client closes itself meanwhile
+            log.warning("lost the workers %s: %r", self._where, error)
             self._disconnect()
             return
         if self._scheduler not in ("", seen["id"]):
@@ -284,6 +301,14 @@ class Cluster:
             client = self._client
         task.future.cancel()
         _tell_workers(client, worker.kill, task.process, workers=[task.address], nanny=True)
+
+
+def _given(client: Any, key: str, priority: int, task: tuple[Any, ...]) -> Any:
+    """The future of what `worker.run` is called with."""
+    with warnings.catch_warnings():
+        # Recordings travel with their task so that a lost worker costs nothing but time.
+        warnings.filterwarnings("ignore", "Sending large graph", UserWarning)
+        return client.submit(worker.run, *task, key=key, pure=False, priority=priority)
 
 
 def _tell_workers(client: Any, function: Any, *values: Any, **where: Any) -> Future[None]:
