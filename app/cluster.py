@@ -23,7 +23,7 @@ from typing import Any, Protocol
 
 from . import logs, worker
 from .dask_connection import ANSWER, DaskConnection
-from .errors import Unavailable
+from .errors import Unavailable, unforeseen
 from .settings import Certificates
 
 log = logging.getLogger(__name__)
@@ -356,8 +356,4 @@ def _explained(future: Any) -> dict[str, str]:
             "try it with fewer or shorter runs.",
         }
     log.error("a task failed unexpectedly", exc_info=error)
-    return {
-        "code": "internal",
-        "detail": f"The job failed unexpectedly ({type(error).__name__}); the service's log has "
-        "the details.",
-    }
+    return unforeseen(error)
