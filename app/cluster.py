@@ -22,25 +22,14 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from . import logs, worker
-from .errors import Unavailable
+from .dask_connection import ANSWER, DaskConnection
+from .errors import Unavailable, unforeseen
 from .settings import Certificates
 
 log = logging.getLogger(__name__)
 
 LOOK_EVERY = 2.0
-"""Time between two looks at a scheduler elsewhere, s; it has as long to connect."""
-
-ANSWER = 5.0
-"""Time that a scheduler, or what it asks its workers, has for an answer, s."""
-
-CONFIGURATION = {
-    # The default of 15 s drops a nanny for good whose worker is lost twice in that time.
-    "distributed.deploy.lost-worker-timeout": "365d",
-    "distributed.scheduler.allowed-failures": 2,
-    # Its web servers start in any case: without pages to show, and not on a port others may want.
-    "distributed.scheduler.http.routes": [],
-    "distributed.worker.http.routes": [],
-}
+"""Time between two looks at a scheduler elsewhere, s."""
 
 
 class Listener(Protocol):
@@ -95,18 +84,17 @@ class Cluster:
         self._tasks: dict[str, _Task] = {}
         self._submissions = 0
         self._token = secrets.token_hex(4)
-        self._client: Any = None
+        self._connection: DaskConnection | None = None
         self._scheduler, self._there, self._looked = "", 0, 0.0
-        self._local: Any = None
         self._leave: threading.Timer | None = None
         self._closed = False
         self.became: Counter[str] = Counter()
         """How many tasks were submitted, and how many were done, failed, cancelled or lost."""
 
     def workers(self) -> int:
-        """How many there are now; 0 while none are needed."""
+        """How many there are now; 0 while none are needed, or can be reached."""
         client = self._client
-        if client is None:
+        if client is None or client.status != "running":
             return 0
         return len(client.sync(client.scheduler.ncores, callback_timeout=1))
 
@@ -128,7 +116,8 @@ class Cluster:
         kept: Mapping[str, bytes] | None = None,
         priority: int = 0,
     ) -> None:
-        """Run a task once; blocks while the cluster starts, Unavailable where it does not.
+        """Run a task once; blocks while the cluster starts, Unavailable where it does not. Any
+        other exception is the task's: it cannot be sent.
 
         kept : parts of its work that are done already
         priority : tasks of a higher one are taken up first
@@ -138,26 +127,25 @@ class Cluster:
                 return
             client = self._started()
             self._submissions += 1
-            self.became["submitted"] += 1
             # Of this service alone: another may have the same task at the same scheduler.
             key = f"{name}-{self._token}-{self._submissions}"
             known = self._tasks[name] = _Task(listener, key)
-            with warnings.catch_warnings():
-                # Recordings travel with their task so that a lost worker costs nothing but time.
-                warnings.filterwarnings("ignore", "Sending large graph", UserWarning)
-                future = client.submit(
-                    worker.run,
-                    name,
-                    key,
-                    task,
-                    payload,
-                    dict(kept or {}),
-                    key=key,
-                    pure=False,
-                    priority=priority,
+            try:
+                known.future = _given(
+                    client, key, priority, (name, key, task, payload, dict(kept or {}))
                 )
-            known.future = future
-        future.add_done_callback(lambda done: self._ended(name, done))
+                if client.status != "running":
+                    raise ConnectionError("what the client was given last may be lost")
+            except Exception as error:
+                del self._tasks[name]
+                if client.status == "running":
+                    self._leave_later()
+                    raise
+                log.warning("lost the workers %s: %r", self._where, error)
+                self._disconnect()
+                raise self._unavailable() from None
+            self.became["submitted"] += 1
+        known.future.add_done_callback(lambda done: self._ended(name, done))
 
     def cancel(self, name: str, grace: float) -> None:
         """Ask a task to stop, and return at once; after `grace` seconds kill its worker."""
@@ -185,73 +173,68 @@ class Cluster:
                 wait([_tell_workers(self._client, worker.ask_to_stop, *keys)], ANSWER)
             self._stop()
 
+    @property
+    def _client(self) -> Any:
+        connection = self._connection
+        return None if connection is None else connection.client
+
     def _started(self) -> Any:
+        """The client, connected anew where that before is lost; Unavailable where it cannot be."""
         if self._leave is not None:
             self._leave.cancel()
-        if self._client is not None and self._address:
+        if self._connection is not None:
             self._look()
-        if self._client is None:
-            try:
-                self._client = self._start()
-            except (OSError, RuntimeError) as error:
-                self._disconnect()
-                where = f"at {self._address}" if self._address else "on this machine"
-                log.error("cannot start or reach the job workers %s: %s", where, error)
-                raise Unavailable(
-                    f"The job workers {where} cannot be started or reached; try again later or "
-                    "look at the service's log."
-                ) from None
-            self._client.subscribe_topic(worker.TOPIC, self._heard)
-            if self._address:
-                self._look()
+        if self._connection is None:
+            self._connect()
+            self._look()
+        if self._connection is None:
+            raise self._unavailable()
         return self._client
 
+    def _connect(self) -> None:
+        try:
+            self._connection = DaskConnection(
+                self._address, self._certificates, self._workers, self._scratch
+            )
+            self._client.subscribe_topic(worker.TOPIC, self._heard)
+        except Exception as error:
+            unforeseen = not isinstance(error, OSError | RuntimeError)
+            log.error("cannot reach the workers %s: %s", self._where, error, exc_info=unforeseen)
+            self._disconnect()
+            raise self._unavailable() from None
+
+    @property
+    def _where(self) -> str:
+        return f"at {self._address}" if self._address else "on this machine"
+
+    def _unavailable(self) -> Unavailable:
+        return Unavailable(
+            f"The job workers {self._where} cannot be started or reached; try again later or look "
+            "at the service's log."
+        )
+
     def _look(self) -> None:
-        """Count the workers of a scheduler elsewhere; give up a client whose scheduler is gone or
-        another one since: Dask's goes on with that, but hears nothing of tasks.
+        """Give up a client that has closed itself, as Dask's does while a scheduler is away, and
+        one whose scheduler is gone or another one since: it goes on with that, but hears nothing of
+        tasks. Count the workers of a scheduler elsewhere.
         """
-        now = time.monotonic()
-        if now - self._looked < LOOK_EVERY:
+        now, client = time.monotonic(), self._client
+        if client.status != "running":
+            log.warning("lost the workers %s: the client is %s", self._where, client.status)
+            self._disconnect()
             return
-        client = self._client
+        if not self._address or now - self._looked < LOOK_EVERY:
+            return
         try:
             seen = client.sync(client.scheduler.identity, n_workers=0, callback_timeout=ANSWER)
-        except (OSError, RuntimeError) as error:
-            log.warning("lost the scheduler at %s: %s", self._address, error)
+        except Exception as error:  # of many kinds where the client closes itself meanwhile
+            log.warning("lost the workers %s: %r", self._where, error)
             self._disconnect()
             return
         if self._scheduler not in ("", seen["id"]):
             self._disconnect()
             return
         self._looked, self._scheduler, self._there = now, seen["id"], seen["total_threads"]
-
-    def _start(self) -> Any:
-        from dask import config
-        from distributed import Client, LocalCluster
-
-        config.set(CONFIGURATION)
-        logging.getLogger("distributed").setLevel(logging.ERROR)
-        logs.adopt("distributed")
-        if self._address:
-            return Client(
-                self._address,
-                security=_security(self._certificates),
-                set_as_default=False,
-                name="ridetune",
-                timeout=LOOK_EVERY,
-            )
-        no_dashboard: Any = None
-        self._local = LocalCluster(
-            n_workers=self._workers,
-            threads_per_worker=1,
-            processes=True,
-            security=True,
-            dashboard_address=no_dashboard,
-            scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
-            local_directory=str(self._scratch),
-            silence_logs=logging.ERROR,
-        )
-        return Client(self._local, set_as_default=False, name="ridetune")
 
     def _stop(self) -> None:
         self._disconnect()
@@ -261,13 +244,10 @@ class Cluster:
         """Let go of the client; tasks that it still had are told to be lost."""
         if self._leave is not None:
             self._leave.cancel()
-        client, local = self._client, self._local
-        self._client = self._local = None
+        connection, self._connection = self._connection, None
         self._scheduler, self._looked = "", 0.0
-        if client is not None:
-            client.close(timeout=ANSWER)
-        if local is not None:
-            local.close()
+        if connection is not None:
+            connection.close()
 
     def _heard(self, event: tuple[float, dict[str, Any]]) -> None:
         news = event[1]
@@ -323,6 +303,14 @@ class Cluster:
         _tell_workers(client, worker.kill, task.process, workers=[task.address], nanny=True)
 
 
+def _given(client: Any, key: str, priority: int, task: tuple[Any, ...]) -> Any:
+    """The future of what `worker.run` is called with."""
+    with warnings.catch_warnings():
+        # Recordings travel with their task so that a lost worker costs nothing but time.
+        warnings.filterwarnings("ignore", "Sending large graph", UserWarning)
+        return client.submit(worker.run, *task, key=key, pure=False, priority=priority)
+
+
 def _tell_workers(client: Any, function: Any, *values: Any, **where: Any) -> Future[None]:
     """Call a function on the workers, without waiting for those that are gone or frozen; done once
     all have called it, or `ANSWER` has passed.
@@ -336,20 +324,6 @@ def _tell_workers(client: Any, function: Any, *values: Any, **where: Any) -> Fut
             log.warning("job workers do not answer: %r", error)
 
     return asyncio.run_coroutine_threadsafe(told(), client.loop.asyncio_loop)
-
-
-def _security(certificates: Certificates | None) -> Any:
-    """What Dask calls the files, and that it must do nothing without them."""
-    from distributed import Security
-
-    if certificates is None:
-        return None
-    return Security(
-        tls_ca_file=str(certificates.ca),
-        tls_client_cert=str(certificates.certificate),
-        tls_client_key=str(certificates.key),
-        require_encryption=True,
-    )
 
 
 def _ending_of(task: _Task, future: Any) -> worker.Ending | None:
@@ -382,8 +356,4 @@ def _explained(future: Any) -> dict[str, str]:
             "try it with fewer or shorter runs.",
         }
     log.error("a task failed unexpectedly", exc_info=error)
-    return {
-        "code": "internal",
-        "detail": f"The job failed unexpectedly ({type(error).__name__}); the service's log has "
-        "the details.",
-    }
+    return unforeseen(error)

@@ -28,6 +28,7 @@ from .job_leases import Beat
 from .jobs_under_way import Closing, JobsUnderWay
 from .lease_keeper import LeaseKeeper
 from .sent_unit import SentUnit
+from .storage import trouble_of
 from .store import Store
 
 log = logging.getLogger(__name__)
@@ -196,20 +197,31 @@ class Dispatcher:
             self._away_until = time.monotonic() + RETRY_AFTER
 
     def _send(self, active: ActiveJob) -> None:
-        unit, job, kind = active.next, active.job, active.kind
-        assert unit is not None
-        task, payload, kept = kind.task, active.payload, {}
+        """Send the next unit of a job; one that cannot be sent fails alone, unless it is the
+        database, the disk or the cluster that is away: then all wait.
+        """
         try:
-            if unit == LAST:
-                kept = self._jobs.parts(active)
-            else:
-                assert kind.division is not None
-                task, payload = kind.division.unit, {**payload, "unit": unit}
+            self._give(active)
         except NotFound:
             # It has ended elsewhere, and its parts went with it; or it is ours still, a part is
             # lost, and it is claimed again with the others.
             self._jobs.let_go(active)
-            return
+        except Unavailable:
+            raise
+        except Exception as error:
+            if isinstance(error, OSError) and trouble_of(error) is not None:
+                raise
+            self._jobs.fail_unforeseen(active, error)
+
+    def _give(self, active: ActiveJob) -> None:
+        unit, job, kind = active.next, active.job, active.kind
+        assert unit is not None
+        task, payload, kept = kind.task, active.payload, {}
+        if unit == LAST:
+            kept = self._jobs.parts(active)
+        else:
+            assert kind.division is not None
+            task, payload = kind.division.unit, {**payload, "unit": unit}
         sent = SentUnit(active, unit, self._jobs)
         self._cluster.submit(
             task_of(job.id, unit), task, payload, sent, kept=kept, priority=job.priority

@@ -107,3 +107,12 @@ class Compiling(Unavailable):
     """The kernels are not compiled yet."""
 
     code = "compiling"
+
+
+def unforeseen(error: BaseException) -> dict[str, str]:
+    """What is told of a job that failed by a fault of ours, as its `code` and `detail`."""
+    return {
+        "code": "internal",
+        "detail": f"The job failed unexpectedly ({type(error).__name__}); the service's log has "
+        "the details.",
+    }

@@ -67,8 +67,10 @@ class Followers:
         looked = -POLL_EVERY
         while True:
             left = looked + POLL_EVERY - time.monotonic()
+            # Not by wait_for, which may swallow that it is cancelled where there are news as well.
             with suppress(TimeoutError):
-                await asyncio.wait_for(self._some.wait(), max(left, 0.0))
+                async with asyncio.timeout(max(left, 0.0)):
+                    await self._some.wait()
             if time.monotonic() >= looked + POLL_EVERY:
                 looked, jobs = time.monotonic(), self.followed
             else:

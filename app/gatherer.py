@@ -29,6 +29,9 @@ class Gathering(Protocol):
     def fail(self, active: ActiveJob, code: str, detail: str) -> None:
         """It cannot be gathered."""
 
+    def fail_unforeseen(self, active: ActiveJob, error: Exception) -> None:
+        """It cannot be gathered, and the log has to say why."""
+
 
 class Gatherer:
     """Gathers what a job is sent with, and says so in the dispatcher's thread."""
@@ -62,10 +65,9 @@ class Gatherer:
         except RideError as error:
             code, detail = error.code, str(error)
             self._say(lambda: self._gathering.fail(active, code, detail))
-        except Exception:
-            log.exception("cannot gather job %s", job.id)
-            detail = "The job could not be started; see the service's log."
-            self._say(lambda: self._gathering.fail(active, "internal", detail))
+        except Exception as error:
+            found = error
+            self._say(lambda: self._gathering.fail_unforeseen(active, found))
         else:
             self._say(lambda: self._gathering.gathered(active, payload, units, slow))
 

@@ -12,8 +12,9 @@ from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from typing import Any
 
+from . import logs
 from .active_job import LAST, ActiveJob, task_of
-from .errors import Unavailable
+from .errors import Unavailable, unforeseen
 from .job_kinds import Progress
 from .job_leases import Beat
 from .sent_unit import SentUnit
@@ -84,9 +85,8 @@ class JobsUnderWay:
                 then()
             except Closing:
                 raise
-            except Exception:
-                log.exception("cannot keep what became of job %s", active.job.id)
-                self.fail(active, "internal", "The job failed; see the service's log.")
+            except Exception as error:
+                self.fail_unforeseen(active, error)
             self._changed(active.job.id)
 
         self._say(heard)
@@ -99,6 +99,14 @@ class JobsUnderWay:
         """Have a job begin with its payload and the units that are not kept yet."""
         if not self._has(active):
             return
+        try:
+            self._begin(active, payload, units, slow)
+        except Closing:
+            raise
+        except Exception as error:
+            self.fail_unforeseen(active, error)
+
+    def _begin(self, active: ActiveJob, payload: Any, units: Sequence[str], slow: bool) -> None:
         for name, progress in self._written(lambda: self._store.parts(active.job.id)).items():
             if name.startswith(_KEPT_BY):
                 active.kept.add(name.removeprefix(_KEPT_BY))
@@ -203,6 +211,12 @@ class JobsUnderWay:
     def fail(self, active: ActiveJob, code: str, detail: str) -> None:
         """End a job of which nothing comes."""
         self._finish(active, "failed", error={"code": code, "detail": detail})
+
+    def fail_unforeseen(self, active: ActiveJob, error: Exception) -> None:
+        """End a job, and none beside it, by a fault of ours."""
+        with logs.about(job=active.job.id):
+            log.error("job %s failed unexpectedly", active.job.id, exc_info=error)
+        self.fail(active, **unforeseen(error))
 
     def _finish(self, active: ActiveJob, state: str, **found: Any) -> None:
         job = active.job.id

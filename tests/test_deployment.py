@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 import yaml
 from distributed.cli import dask_scheduler, dask_worker
-from ridetune.app.cluster import CONFIGURATION
+from ridetune.app.dask_connection import CONFIGURATION
 from ridetune.app.origins import refusal
 from ridetune.app.settings import VARIABLES, Settings
 

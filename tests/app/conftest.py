@@ -15,7 +15,7 @@ from dask import config
 from distributed import LocalCluster
 from fastapi.testclient import TestClient
 from ridetune.app.cli import main
-from ridetune.app.cluster import CONFIGURATION
+from ridetune.app.dask_connection import CONFIGURATION
 from ridetune.app.limits import Limits
 from ridetune.app.main import create_app
 from ridetune.app.settings import Settings

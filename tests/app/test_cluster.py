@@ -292,6 +292,83 @@ def test_a_scheduler_that_was_lost_is_found_again(tmp_path, heard):
         far.close()
 
 
+def test_a_scheduler_that_was_away_while_nobody_needed_it_is_found_again(tmp_path, heard):
+    """For so long that Dask's client has closed itself."""
+    folder = tmp_path / "far"
+    folder.mkdir()
+    far = DaskProcesses(folder, make_certificates(folder))
+    far.start_scheduler()
+    cluster = Cluster(far.address, tmp_path, certificates=far.certificates)
+    try:
+        cluster.width()
+        far.scheduler.kill()
+        far.scheduler.wait()
+        until(lambda: cluster._client.status == "closed")
+        assert cluster.workers() == 0
+        far.start_scheduler(port=int(far.address.rpartition(":")[2]))
+        far.start_worker()
+        until(lambda: not is_away(cluster))
+        cluster.submit("again", tasks.double, 21, heard)
+        assert heard.end_of("again")["state"] == "done"
+    finally:
+        cluster.close()
+        far.close()
+
+
+CLOSES = {
+    "before": lambda client, submit: (client.close(), submit()),
+    "after": lambda client, submit: (submit(), client.close())[0],
+}
+
+
+@pytest.mark.parametrize("when", CLOSES)
+def test_a_client_that_closes_itself_as_a_task_is_sent_is_replaced(
+    tmp_path, heard, dask_processes, when
+):
+    far = dask_processes
+    cluster = Cluster(far.address, tmp_path, certificates=far.certificates)
+    try:
+        cluster.width()
+        client = cluster._client
+        submit = client.submit
+        client.submit = lambda *told, **more: CLOSES[when](client, lambda: submit(*told, **more))
+        with pytest.raises(Unavailable):
+            cluster.submit("lost", tasks.double, 1, heard)
+        cluster.submit("again", tasks.double, 21, heard)
+        assert heard.end_of("again")["state"] == "done"
+        assert cluster.became == {"submitted": 1, "done": 1}
+    finally:
+        cluster.close()
+
+
+def test_a_client_that_closes_itself_as_it_is_looked_at_is_replaced(
+    tmp_path, heard, dask_processes, monkeypatch
+):
+    monkeypatch.setattr("ridetune.app.cluster.LOOK_EVERY", 0.0)
+    far = dask_processes
+    cluster = Cluster(far.address, tmp_path, certificates=far.certificates)
+    try:
+        cluster.width()
+        cluster._client.scheduler = None
+        cluster.submit("again", tasks.double, 21, heard)
+        assert heard.end_of("again")["state"] == "done"
+    finally:
+        cluster.close()
+
+
+def test_a_task_that_cannot_be_sent_keeps_no_workers(tmp_path, heard):
+    """They leave as if it had never been."""
+    cluster = Cluster("", tmp_path, workers=1, idle_seconds=0.1)
+    try:
+        with pytest.raises(TypeError):
+            cluster.submit("locked", tasks.double, threading.Lock(), heard)
+        until(lambda: cluster._client is None)
+        cluster.submit("after", tasks.double, 1, heard)
+        assert heard.end_of("after")["state"] == "done"
+    finally:
+        cluster.close()
+
+
 def test_what_one_service_stops_is_not_what_another_runs(tmp_path, heard, dask_processes):
     """The same task of both, on one scheduler, as when a lease was lost: each hears of its own."""
     far, other, goes_on = dask_processes, Heard(), tmp_path / "goes on"
@@ -347,3 +424,16 @@ def test_workers_that_cannot_be_reached_are_a_sentence(tmp_path, heard, monkeypa
         with pytest.raises(Unavailable, match=r"tcp://127\.0\.0\.1:9"):
             cluster.submit("lost", tasks.double, 1, heard)
         cluster.close()
+
+
+def test_a_scheduler_that_stays_away_costs_no_more_each_time_it_is_tried(tmp_path, monkeypatch):
+    """Neither threads nor open files, however long that lasts."""
+    monkeypatch.setattr("ridetune.app.dask_connection.CONNECT", 0.2)
+    cluster = Cluster("tcp://127.0.0.1:9", tmp_path)
+    assert is_away(cluster)  # Dask has threads that all its clients share
+    threads, files = threading.active_count(), psutil.Process().num_fds()
+    for _ in range(3):
+        assert is_away(cluster)
+    assert threading.active_count() <= threads
+    assert psutil.Process().num_fds() <= files
+    cluster.close()

@@ -394,6 +394,62 @@ def test_a_job_of_which_nobody_knows_how_slow_it_is_fails_alone(team, monkeypatc
     until(lambda: f"{good}/a" in cluster.tasks)
 
 
+@pytest.mark.parametrize("place", ["gathered", "submit", "parts"])
+def test_a_job_that_cannot_be_sent_fails_alone(team, monkeypatch, caplog, place):
+    """By a fault of ours, which the log tells; those that come after it are sent."""
+    team.taking = False
+    cluster = team.dispatch()
+    bad, good = team.submit("sweep", team.ann, "a"), team.submit("sweep", team.ann, "a")
+
+    def spoil(holder, name):
+        usual = getattr(holder, name)
+
+        def spoilt(job, *more):
+            if job.startswith(bad):
+                raise ValueError("secret detail")
+            return usual(job, *more)
+
+        monkeypatch.setattr(holder, name, spoilt)
+
+    match place:
+        case "gathered":
+            spoil(team.store, "parts")
+        case "submit":
+            spoil(cluster, "meanwhile")
+        case "parts":
+            spoil(team.store, "part")
+    team.taking = True
+    if place == "parts":
+        make(cluster, bad, "a")
+    until(lambda: team.state(bad) == "failed")
+    make(cluster, good, "a")
+    until(lambda: good in cluster.tasks)
+    cluster.end(good, "done", result={})
+    until(lambda: team.state(good) == "done")
+    error = team.store.jobs.get(team.ann, bad).error
+    assert error["code"] == "internal"
+    assert "(ValueError)" in error["detail"]
+    assert "secret" not in error["detail"]
+    assert "ValueError: secret detail" in caplog.text
+
+
+@pytest.mark.parametrize("number", [errno.EMFILE, errno.ENOMEM, errno.ENOSPC, errno.EIO])
+def test_a_job_is_sent_once_the_service_has_what_it_takes(team, number):
+    """It is not the job's fault."""
+    refusals = [OSError(number, "injected"), Unavailable("It is away.")]
+
+    def refuse(name):
+        if refusals:
+            raise refusals.pop()
+
+    cluster = team.dispatch()
+    cluster.meanwhile = refuse
+    fit = team.submit("fit", team.ann)
+    until(lambda: fit in cluster.tasks)
+    assert not refusals
+    assert team.state(fit) == "queued"
+
+
 @pytest.mark.parametrize("number", [errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ENOSPC])
 def test_a_part_waits_for_what_there_is_too_little_of(team, monkeypatch, number):
     """Files, memory, or room on the disk; the part is kept once there is enough again."""
