@@ -28,6 +28,10 @@ CONFIGURATION = {
     # Its web servers start in any case: without pages to show, and not on a port others may want.
     "distributed.scheduler.http.routes": [],
     "distributed.worker.http.routes": [],
+    # What it draws on those pages: samples of every stack, and whether the event loops are late,
+    # fifty times a second in each process.
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "500ms",
 }
 
 
