@@ -86,6 +86,9 @@ _SPELLINGS = {
 }
 """Unit texts of test departments; pint takes Grad for the gradian."""
 
+_EVERYDAY = {("mm", "m"): 1e-3, ("deg", "rad"): math.pi / 180.0, ("km/h", "m/s"): 1.0 / 3.6}
+"""What our own files are written in: pint takes a second to start, as much as all of a service."""
+
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻−", "0123456789--")
 _WORD = r"[A-Za-z\u00b5\u03bc°%]+(?:_[A-Za-z0-9]+)?"
 _SEPARATOR = re.compile(r"\s*[*·⋅./]\s*|\s+")
@@ -108,7 +111,8 @@ def to_si(text: str, si_unit: str) -> tuple[float, float]:
     number here, so Hz is no rad/s. Capitals are forgiven where that leaves one meaning (KM/H).
     """
     text = " ".join(text.split())
-    return (1.0, 0.0) if text == si_unit else _converted(text, si_unit)
+    factor = 1.0 if text == si_unit else _EVERYDAY.get((text, si_unit))
+    return _converted(text, si_unit) if factor is None else (factor, 0.0)
 
 
 @lru_cache(maxsize=1000)

@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from ridetune.engine import units
 from ridetune.engine.units import UnitError, in_percent, to_si
 
 
@@ -47,6 +48,11 @@ from ridetune.engine.units import UnitError, in_percent, to_si
 )
 def test_a_unit_has_its_defined_factor(text, si_unit, factor):
     assert to_si(text, si_unit) == (pytest.approx(factor, rel=1e-12), 0.0)
+
+
+@pytest.mark.parametrize(("text", "si_unit"), units._EVERYDAY)
+def test_a_unit_of_our_own_files_is_pints(text, si_unit):
+    assert to_si(text, si_unit) == pytest.approx(units._converted(text, si_unit), rel=1e-15)
 
 
 @pytest.mark.parametrize("text", ["g", "G", "gn", "g_n"])
