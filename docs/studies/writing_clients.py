@@ -36,7 +36,7 @@ class Kind:
     needs_fit: bool = False
 
 
-MOST_UNDER_WAY = 3
+MOST_UNDER_WAY = 10
 """Jobs of one client at a time: what kills put off must still be done at the end."""
 
 ENDED = ("done", "failed", "cancelled")
