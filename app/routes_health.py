@@ -11,14 +11,12 @@ from .services import Shared
 router = APIRouter(tags=["health"])
 
 
-@router.head("/healthz", include_in_schema=False)
 @router.get("/healthz")
 async def healthz() -> dict[str, str]:
     """The service runs: its event loop answers."""
     return {"state": "running"}
 
 
-@router.head("/readyz", include_in_schema=False)
 @router.get("/readyz", responses={503: {"description": "Not all of it; which part is not ready."}})
 async def readyz(services: Shared) -> JSONResponse:
     """The service does its work: 200 with all of its parts, else 503; state and sentence of the

@@ -59,10 +59,6 @@ def test_the_service_runs_and_every_part_is_ready(client):
     assert {part["state"] for part in told["parts"].values()} == {"ready"}
 
 
-def test_a_watcher_may_ask_for_the_heads_alone(client):
-    assert [client.head(path).status_code for path in ("/healthz", "/readyz")] == [200, 200]
-
-
 def test_what_is_not_ready_is_told_by_its_name_and_not_where_it_is(tmp_path):
     """Nothing listens at port 9 (RFC 863's, not in use); the answer names neither it nor a path."""
     settings = Settings(data=tmp_path / "data", cluster="tls://127.0.0.1:9")
