@@ -3,9 +3,13 @@
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import httpx2
+
+PATIENCE = 240.0
+"""How long kernels may take to be compiled, s."""
 
 PROGRAM = """
 import sys
@@ -31,6 +35,14 @@ class LiveService:
         assert found, line
         self.address = found.group()
         self.client = httpx2.Client(base_url=self.address, timeout=60.0)
+
+    def ready(self) -> "LiveService":
+        """Itself, once the kernels are loaded."""
+        deadline = time.monotonic() + PATIENCE
+        while self.client.get("/readyz").status_code != 200:
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        return self
 
     def kill(self) -> None:
         """As a power cut would."""

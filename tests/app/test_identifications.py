@@ -230,7 +230,7 @@ def test_after_a_kill_nothing_is_left_behind_and_nothing_is_lost(tmp_path, worke
     """Workers go with the service; uploads are byte-exact; acknowledged jobs run after all."""
     recording = (SAMPLES / "twin/manoeuvre_1.csv").read_bytes()
     with LiveService(tmp_path) as service:
-        visitor = Visitor(service.client)
+        visitor = Visitor(service.ready().client)
         run = visitor.upload(recording, "twin.csv").json()["id"]
         asked = {"runs": [run], "free": ["front.suspension.stiffness"]}
         job = visitor.post("/identifications", json=asked).json()["id"]
@@ -250,7 +250,7 @@ def test_after_a_kill_nothing_is_left_behind_and_nothing_is_lost(tmp_path, worke
 def test_a_live_stream_ends_with_the_client_and_the_service_stops_on_request(tmp_path):
     """The first event comes while the job is still queued; a signal ends the service in time."""
     with LiveService(tmp_path) as service:
-        visitor = Visitor(service.client)
+        visitor = Visitor(service.ready().client)
         runs = [kept["id"] for kept in visitor.get("/measurements").json()]
         job = visitor.post("/identifications", json={"runs": runs}).json()["id"]
         with service.client.stream(

@@ -25,8 +25,6 @@ from .conftest import Visitor, open_client
 from .live import LiveService
 from .test_jobs import StandIn, until
 
-COMPILING = 240.0
-"""How long a service may take to be ready to simulate where nothing is compiled yet, s."""
 RANGES = {"K_F": [1e4, 4e4], "chassis.mass": [900.0, 1300.0]}
 BOX = {"kind": "sobol", "ranges": RANGES, "cars": 12, "seed": 3}
 PAPER = vehicle_to_json(reference_vehicles()["paper"])
@@ -301,8 +299,7 @@ def test_a_sweep_kept_from_before_there_were_shares_is_one(done):
 
 def test_a_sweep_outlives_a_kill_of_the_service_and_so_do_the_rows_of_another(tmp_path, workers):
     with LiveService(tmp_path) as service:
-        visitor = Visitor(service.client)
-        until(lambda: service.client.get("/readyz").status_code == 200, patience=COMPILING)
+        visitor = Visitor(service.ready().client)
         done = visitor.wait_for("sweeps", submit(visitor)["id"])
         before = rows(visitor, done)
         job = submit(visitor, design={**BOX, "cars": 100})["id"]
