@@ -50,6 +50,7 @@ class DaskConnection:
 
         config.set(CONFIGURATION)
         logging.getLogger("distributed").setLevel(logging.ERROR)
+        logging.getLogger("distributed.client").addFilter(_unless_given_up)
         logs.adopt("distributed")
         self._loop = _LoopThread()
         own: dict[str, Any] = {"loop": self._loop.loop, "set_as_default": False, "name": "ridetune"}
@@ -96,6 +97,13 @@ class _LoopThread:
     def close(self) -> None:
         self.loop.add_callback(self._ended.set)
         self._thread.join(ANSWER)
+
+
+def _unless_given_up(record: logging.LogRecord) -> bool:
+    """A client that is closed while it looks for its scheduler tells that as an error, with a
+    traceback; that the scheduler was lost is told by whoever closes it.
+    """
+    return not (record.exc_info and record.exc_info[0] is asyncio.CancelledError)
 
 
 def _told(close: Callable[[], None]) -> None:

@@ -262,9 +262,10 @@ def test_it_tells_how_wide_it_is_and_what_became_of_its_tasks(cluster, heard):
     until(lambda: cluster.workers() == 2)
 
 
-def test_a_scheduler_that_was_lost_is_found_again(tmp_path, heard):
+def test_a_scheduler_that_was_lost_is_found_again(tmp_path, heard, caplog):
     """What ran is told to be lost, with no blame; at first nothing can be submitted, then it can,
-    and the new scheduler's tasks are heard of. Its workers end with it and are started again."""
+    and the new scheduler's tasks are heard of. Its workers end with it and are started again. The
+    log tells of it in sentences."""
     folder = tmp_path / "far"
     folder.mkdir()
     far = DaskProcesses(folder, make_certificates(folder))
@@ -287,6 +288,8 @@ def test_a_scheduler_that_was_lost_is_found_again(tmp_path, heard):
         assert ending["result"]["value"] == 42
         assert {heard.started.get(timeout=PATIENCE) for _ in range(2)} == {"lost", "again"}
         assert heard.progress.get(timeout=PATIENCE) == ("again", {"cost": 1.0})
+        assert any("lost the workers" in record.message for record in caplog.records)
+        assert not [record for record in caplog.records if record.exc_info]
     finally:
         cluster.close()
         far.close()
