@@ -61,6 +61,10 @@ INPUT_CHANNELS = (*WHEEL_CHANNELS, "chassis.a_x")
 OUTPUT_CHANNELS = ("chassis.z", "chassis.pitch", "chassis.roll")
 """What the model is compared with there; a recording needs at least one."""
 
+SMALLEST_NOISE, LARGEST_NOISE = 1e-12, 1e12
+"""Between which the standard deviation of a channel's noise must lie, SI: far beyond what any
+sensor has, and squares of residuals over it are numbers still."""
+
 CHANNEL_KINDS: tuple[ChannelInfo, ...] = (
     _row("time", "s", "time", "Time", "strictly increasing"),
     _row(

@@ -14,7 +14,6 @@ Other keys are for other readers.
 
 import math
 import re
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
@@ -24,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .channels import channel, find_channel
+from .channels import LARGEST_NOISE, SMALLEST_NOISE, channel, find_channel
 from .errors import MeasurementError
 from .run import Run
 from .short_file import read_short
@@ -139,11 +138,12 @@ def checked_noise(noise: Mapping[str, Any], source: str) -> dict[str, float]:
         except MeasurementError as error:
             raise MeasurementError(f"{source}: noise: {error}") from error
         number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not number or not 0.0 < value <= sys.float_info.max:
+        if not number or not SMALLEST_NOISE <= value <= LARGEST_NOISE:
             plain = toml_value(value) if isinstance(value, int | float) else "no number"
             shown = f"'{value}'" if isinstance(value, str) else plain
             raise MeasurementError(
-                f"{source}: noise of {name} is {shown}; give a positive number in {info.unit}."
+                f"{source}: noise of {name} is {shown}; give a positive number in {info.unit}, "
+                f"from {SMALLEST_NOISE:g} to {LARGEST_NOISE:g}."
             )
     return {name: float(value) for name, value in noise.items()}
 

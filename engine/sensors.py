@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
-from .channels import CHANNELS, channel
+from .channels import CHANNELS, SMALLEST_NOISE, channel
 from .frames import CORNERS
 from .run import Run
 from .units import to_si
@@ -99,10 +99,9 @@ class SensorSet:
         return int(np.floor(duration * self.rate_hz + _SAME_INSTANT)) + 1
 
     def noise(self) -> dict[str, float]:
-        """Standard deviation by channel in SI, of those that are noisy."""
-        return {
-            name: one.noise * one.si_factor(name) for name, one in self.sensors.items() if one.noise
-        }
+        """Standard deviation by channel in SI, of those whose noise is any worth stating."""
+        stated = {name: one.noise * one.si_factor(name) for name, one in self.sensors.items()}
+        return {name: noise for name, noise in stated.items() if noise >= SMALLEST_NOISE}
 
     def units(self) -> dict[str, str]:
         """Unit by channel, of those with one of their own."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import OUTPUT_CHANNELS, conditioned_first
+from ..channels import LARGEST_NOISE, OUTPUT_CHANNELS, SMALLEST_NOISE, conditioned_first
 from ..errors import ProblemError
 from ..filters import low_pass, too_coarse
 from ..run import Run
@@ -80,8 +80,11 @@ def compared_runs(
                 f"A noise is stated for {channel}; the compared channels are "
                 f"{', '.join(OUTPUT_CHANNELS)}."
             )
-        if not 0.0 < deviation < math.inf:
-            raise ProblemError(f"The noise of {channel} is {deviation}; it must be positive.")
+        if not SMALLEST_NOISE <= deviation <= LARGEST_NOISE:
+            raise ProblemError(
+                f"The noise of {channel} is {deviation:g}; it must lie between {SMALLEST_NOISE:g} "
+                f"and {LARGEST_NOISE:g}."
+            )
     if twice := [channel for channel in sensors.noise() if channel in noise]:
         raise ProblemError(
             f"The noise of {twice[0]} is stated twice, by itself and as sensor.{twice[0]}.noise; "

@@ -12,7 +12,15 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Any
 
-from ..channels import INPUT_CHANNELS, OUTPUT_CHANNELS, WHEEL_CHANNELS, channel, near_channel
+from ..channels import (
+    INPUT_CHANNELS,
+    LARGEST_NOISE,
+    OUTPUT_CHANNELS,
+    SMALLEST_NOISE,
+    WHEEL_CHANNELS,
+    channel,
+    near_channel,
+)
 from ..errors import ProblemError
 from .sensing import Reading
 from .variables import Variable
@@ -246,10 +254,10 @@ def _check(name: str, quantity: str, value: Any, biased: bool) -> None:
         "gain": (SMALLEST_GAIN, LARGEST_GAIN, "a factor; a turned sensor has the sign -1"),
         "bias": (-LARGEST_BIAS, LARGEST_BIAS, f"a number in {channel(name).unit}"),
         "sign": (-1.0, 1.0, "1, or -1 for a turned sensor"),
-        "noise": (math.ulp(0.0), LARGEST_BIAS, f"a standard deviation in {channel(name).unit}"),
+        "noise": (SMALLEST_NOISE, LARGEST_NOISE, f"a standard deviation in {channel(name).unit}"),
     }[quantity]
     if not lowest <= value <= highest or (quantity == "sign" and abs(value) != 1.0):
-        span = {"sign": "", "noise": ", above 0"}.get(quantity, f", from {lowest:g} to {highest:g}")
+        span = "" if quantity == "sign" else f", from {lowest:g} to {highest:g}"
         raise ProblemError(f"{path} is {value:g}; give {what}{span}.")
 
 

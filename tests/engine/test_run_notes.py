@@ -60,6 +60,8 @@ def test_empty_notes_state_nothing():
         (b'[noise]\n"chassis.z" = true', "noise of chassis.z is true; give a positive"),
         (b'[noise]\n"chassis.z" = nan', "noise of chassis.z is nan; give a positive"),
         (b'[noise]\n"chassis.roll" = 0', "noise of chassis.roll is 0; give a positive"),
+        (b'[noise]\n"chassis.z" = 1e-200', "give a positive number in m, from 1e-12 to 1e+12."),
+        (b'[noise]\n"chassis.z" = 1e13', "give a positive number in m, from 1e-12 to 1e+12."),
     ],
 )
 def test_a_fault_in_the_notes_is_named(text, message):

@@ -115,3 +115,8 @@ def test_the_recording_states_the_noise_and_nothing_of_bias_gain_or_delay():
     run = measured(Run("run", DENSE, {"chassis.z": wave(DENSE)}), sensors, 0, 0)
     assert run.noise == {"chassis.z": 1e-3}
     assert (run.description, run.warnings) == ("", ())
+
+
+def test_a_noise_too_small_to_be_read_from_notes_is_not_stated():
+    sensors = SensorSet(sensors={"chassis.z": Sensor(noise=1e-200)})
+    assert measured(Run("run", DENSE, {"chassis.z": wave(DENSE)}), sensors, 0, 0).noise == {}
