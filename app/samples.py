@@ -3,14 +3,15 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
+from ..engine.remembered import Remembered
 from ..engine.run_notes import manoeuvre_beside
 from .measurement import NewMeasurement
 from .package_files import package_folder
 from .recordings import summary
+from .simulator import Host
 
 FOLDER = "detailed"
 VEHICLE = "vehicle.json"
@@ -25,9 +26,21 @@ class SampleProject:
     measurements: tuple[NewMeasurement, ...]
 
 
-@cache
+_KNOWN: Remembered[str, SampleProject] = Remembered(1)
+
+
 def sample_project() -> SampleProject:
-    """The project as it comes with the package."""
+    """The project as it comes with the package, read once."""
+    return _KNOWN.made(FOLDER, read_sample_project, lambda _: 1)
+
+
+def remember(project: SampleProject) -> None:
+    """Spare this process from reading it, which takes scipy."""
+    _KNOWN.keep(FOLDER, project, 1)
+
+
+def read_sample_project(_: Host | None = None) -> SampleProject:
+    """The project, read from its files; here or in a simulator."""
     from ..engine.vehicle_file import read_vehicle, vehicle_to_json
 
     folder = package_folder("sample_runs") / FOLDER

@@ -13,7 +13,7 @@ from typing import Literal
 from ..engine.kernel_cache import is_compiled
 from .compile import PARTS, start_compilers
 from .errors import Compiling, Unavailable
-from .samples import sample_project
+from .samples import read_sample_project, remember
 from .simulators import Simulators
 
 log = logging.getLogger(__name__)
@@ -105,11 +105,11 @@ class WarmUp:
 
 
 def ready_to_simulate(warmup: WarmUp, simulators: Simulators) -> None:
-    """The service's own warm-up: the sample project, while the kernels are loaded elsewhere, then
-    the simulators.
+    """The service's own warm-up: the simulators, and from one of them the sample project, which
+    the service would have to load scipy for.
     """
-    sample_project()
     if not is_compiled():
         warmup.compile_apart()
     if not warmup.closed:
         simulators.start()
+        remember(simulators.run("", read_sample_project))

@@ -11,6 +11,8 @@ from ridetune.app.errors import Compiling, Unavailable
 from ridetune.app.warmup import WarmUp
 from ridetune.engine.kernel_cache import is_compiled
 
+from .live import LiveService
+
 
 def test_work_waits_until_the_kernels_are_there():
     warmup = WarmUp(lambda warmup: warmup.tell("Compiling a wheel."))
@@ -109,6 +111,16 @@ def test_stopping_the_service_stops_the_compiler(monkeypatch, tmp_path):
     assert warmup.wait() is False
     _, alive = psutil.wait_procs(compilers, timeout=10)
     assert alive == []
+
+
+def test_a_service_is_ready_and_has_a_session_before_it_loads_scipy(tmp_path):
+    """Simulators have it already. Oracle: the libraries in the process's memory."""
+    with LiveService(tmp_path) as service:
+        service.ready()
+        assert service.client.post("/api/sessions").status_code == 201
+        mapped = [part.path for part in psutil.Process(service.process.pid).memory_maps()]
+    assert [path for path in mapped if "/numpy/" in path]
+    assert not [path for path in mapped if "/scipy/" in path]
 
 
 def test_every_part_can_be_taken_again():
