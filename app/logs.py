@@ -85,6 +85,8 @@ def configure(form: Form, level: str) -> None:
     handler.setFormatter(JsonLines() if form == "json" else TextLines())
     logging.basicConfig(level=logging.WARNING, handlers=[handler], force=True)
     logging.getLogger("ridetune").setLevel(level)
+    # What is wrong with an upload is told to whoever sent it, who could else fill the log.
+    logging.getLogger("python_multipart").setLevel(logging.ERROR)
     logging.captureWarnings(True)
     threading.excepthook = _log_thread
 

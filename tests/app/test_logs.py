@@ -220,6 +220,22 @@ def test_the_form_and_the_level_are_settings(tmp_path):
     assert (settings.log, settings.log_level) == ("json", "INFO")
 
 
+def test_a_malformed_upload_leaves_no_line():
+    """Of the parser's, for which anybody could fill the log."""
+    program = """if True:
+        from python_multipart.exceptions import MultipartParseError
+        from python_multipart.multipart import MultipartParser
+        from ridetune.app.logs import configure
+        configure("text", "INFO")
+        try:
+            MultipartParser(b"b").write(b"--b\\r\\nContent\\xc3: x\\r\\n")
+        except MultipartParseError:
+            print("refused")
+    """
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("refused\n", "")
+
+
 def test_of_a_library_with_handlers_of_its_own_only_warnings_are_written():
     theirs = logging.getLogger("a_library.part")
     theirs.addHandler(logging.NullHandler())
