@@ -14,9 +14,10 @@ from ridetune.app.store import Store
 from ridetune.app.tables import jobs
 from sqlalchemy import update
 
-from .test_jobs import StandIn, until
+from .stand_in_cluster import StandIn
+from .waiting import until
 
-WIDTH = StandIn("", None).width()
+WIDTH = StandIn().width()
 MEANWHILE = 5
 """Units that may end between a job's claim and its first unit: its payload is gathered."""
 
@@ -55,7 +56,7 @@ class Team:
 
     def dispatch(self) -> StandIn:
         """The cluster of one more."""
-        cluster = StandIn("", None)
+        cluster = StandIn()
         made = Dispatcher(
             self.store, cluster, KINDS, self.changed.append, lambda: True, lambda: self.taking
         )

@@ -4,7 +4,7 @@ import asyncio
 import json
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack
 from functools import partial
 
@@ -16,65 +16,7 @@ from ridetune.app.limits import Limits
 from ridetune.app.owner_store import OwnerStore
 
 from .conftest import Visitor, open_client
-
-PATIENCE = 20.0
-
-
-class StandIn:
-    """A cluster whose tasks do what the test says."""
-
-    def __init__(self, address: str, scratch, certificates=None):
-        self.tasks: dict[str, tuple] = {}
-        self.cancelled: list[str] = []
-        self.graces: dict[str, float] = {}
-        self.kept: dict[str, dict[str, bytes]] = {}
-        self.refusing = False
-        self.meanwhile: Callable[[str], object] = lambda name: None
-
-    def width(self):
-        return 3
-
-    def submit(self, name, task, payload, listener, *, kept, priority):
-        if self.refusing:
-            raise Unavailable("The job workers cannot be reached.")
-        self.meanwhile(name)
-        self.tasks[name] = (task, payload, listener)
-        self.kept[name] = kept
-
-    def cancel(self, name, grace):
-        self.cancelled.append(name)
-        self.graces[name] = grace
-        if name in self.tasks:
-            self.end(name, "cancelled")
-
-    def close(self):
-        self.tasks.clear()
-
-    def start(self, name: str) -> None:
-        self.tasks[name][2].task_started(name)
-
-    def report(self, name: str, **progress) -> None:
-        self.tasks[name][2].task_progressed(name, progress)
-
-    def end(self, name: str, state: str, result=None, error=None) -> None:
-        ending = {"state": state, "result": result, "error": error, "progress": {}}
-        self.tasks.pop(name)[2].task_ended(name, ending)
-
-    def lose(self, name: str, with_worker: bool) -> None:
-        self.tasks.pop(name)[2].task_lost(name, with_worker=with_worker)
-
-
-@pytest.fixture
-def clusters(monkeypatch) -> list[StandIn]:
-    """The stand-ins of all services of a test, the latest last."""
-    made: list[StandIn] = []
-
-    def make(address, scratch, certificates) -> StandIn:
-        made.append(StandIn(address, scratch))
-        return made[-1]
-
-    monkeypatch.setattr("ridetune.app.main.Cluster", make)
-    return made
+from .waiting import until
 
 
 @pytest.fixture
@@ -91,13 +33,6 @@ def owner(service) -> Visitor:
 def submit(owner: Visitor, **more) -> dict:
     runs = [kept["id"] for kept in owner.get("/measurements").json()][:1]
     return owner.submit("identifications", {"runs": runs, **more})
-
-
-def until(condition: Callable[[], object], patience: float = PATIENCE) -> None:
-    deadline = time.monotonic() + patience
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.005)
 
 
 def state(owner: Visitor, job: str) -> str:
