@@ -23,10 +23,11 @@ from ridetune.app.simulators import Simulators
 
 from .command_line import SHORT
 from .dask_processes import dask_processes
+from .dispatcher_team import team
 from .postgresql_server import on_postgresql, postgresql
 from .stand_in_cluster import clusters
 
-__all__ = ["clusters", "dask_processes", "on_postgresql", "postgresql"]
+__all__ = ["clusters", "dask_processes", "on_postgresql", "postgresql", "team"]
 
 ADDRESS = "http://127.0.0.1:8000"
 SAMPLES = Path(__file__).parents[2] / "sample_runs"
