@@ -151,6 +151,18 @@ def visitor(client) -> Visitor:
 
 
 @pytest.fixture
+def service(settings, clusters) -> Iterator[TestClient]:
+    """A client of a service whose cluster is a stand-in."""
+    with open_client(settings) as client:
+        yield client
+
+
+@pytest.fixture
+def owner(service) -> Visitor:
+    return Visitor(service)
+
+
+@pytest.fixture
 def small_limits(tmp_path) -> Settings:
     """A service that refuses early."""
     limits = Limits(
