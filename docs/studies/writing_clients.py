@@ -16,6 +16,7 @@ from typing import Any
 
 import httpx2
 from killed_service import Service
+from ridetune.app.bench.service.work import ENDS
 from ridetune.app.package_files import package_folder
 
 TOLERANCE = 1e-6
@@ -38,8 +39,6 @@ class Kind:
 
 MOST_UNDER_WAY = 10
 """Jobs of one client at a time: what kills put off must still be done at the end."""
-
-ENDED = ("done", "failed", "cancelled")
 
 SIMULATION = {"manoeuvre": "bump", "max_samples": 2}
 RANGES = {"K_F": [15_000, 40_000], "C_F": [800, 3000]}
@@ -86,7 +85,7 @@ class Session:
     def has_ended(self, service: Service, kind: str, job: str) -> bool:
         """Whether a job has come to its end."""
         reply = self.request(service, "GET", f"/{KINDS[kind].place}/{job}")
-        return reply.status_code == 200 and reply.json()["state"] in ENDED
+        return reply.status_code == 200 and reply.json()["state"] in ENDS
 
     def body(self, kind: str) -> dict[str, Any]:
         """The request of a job of this session."""

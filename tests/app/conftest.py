@@ -23,9 +23,11 @@ from ridetune.app.simulators import Simulators
 
 from .command_line import SHORT
 from .dask_processes import dask_processes
+from .dispatcher_team import team
 from .postgresql_server import on_postgresql, postgresql
+from .stand_in_cluster import clusters
 
-__all__ = ["dask_processes", "on_postgresql", "postgresql"]
+__all__ = ["clusters", "dask_processes", "on_postgresql", "postgresql", "team"]
 
 ADDRESS = "http://127.0.0.1:8000"
 SAMPLES = Path(__file__).parents[2] / "sample_runs"
@@ -146,6 +148,18 @@ def client(settings) -> Iterator[TestClient]:
 @pytest.fixture
 def visitor(client) -> Visitor:
     return Visitor(client)
+
+
+@pytest.fixture
+def service(settings, clusters) -> Iterator[TestClient]:
+    """A client of a service whose cluster is a stand-in."""
+    with open_client(settings) as client:
+        yield client
+
+
+@pytest.fixture
+def owner(service) -> Visitor:
+    return Visitor(service)
 
 
 @pytest.fixture

@@ -24,7 +24,6 @@ from ridetune.engine.sensor_file import noisy
 from ridetune.engine.vehicle_file import reference_vehicles, vehicle_to_json
 
 from .conftest import PATIENCE, Visitor, open_client
-from .test_jobs import StandIn
 
 CAR = reference_vehicles()["paper"]
 PAPER = vehicle_to_json(CAR)
@@ -316,8 +315,7 @@ def test_a_campaign_kept_from_before_it_told_its_drives_has_the_same():
     assert division.slow(earlier) is division.slow(spec) is False
 
 
-def test_the_same_key_drives_once(tmp_path, monkeypatch):
-    monkeypatch.setattr("ridetune.app.main.Cluster", StandIn)
+def test_the_same_key_drives_once(tmp_path, clusters):
     with open_client(Settings(data=tmp_path)) as client:
         visitor = Visitor(client)
         first = submit(visitor, key="click-1")

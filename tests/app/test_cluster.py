@@ -5,7 +5,6 @@ import os
 import queue
 import signal
 import threading
-import time
 from collections.abc import Callable
 from contextlib import suppress
 
@@ -18,6 +17,7 @@ from ridetune.app.worker import MOST_KEPT, Ending
 
 from . import tasks
 from .dask_processes import DaskProcesses, make_certificates
+from .waiting import until
 
 PATIENCE = 60.0
 
@@ -241,10 +241,7 @@ def test_an_idle_cluster_leaves_and_comes_back(tmp_path, heard):
         ending = heard.end_of("one")
         assert ending["result"] is not None
         first = ending["result"]["process"]
-        until = time.monotonic() + PATIENCE
-        while psutil.pid_exists(first):
-            assert time.monotonic() < until
-            time.sleep(0.05)
+        until(lambda: not psutil.pid_exists(first))
         cluster.submit("two", tasks.double, 2, heard)
         assert heard.end_of("two")["state"] == "done"
     finally:
@@ -397,13 +394,6 @@ def is_away(cluster: Cluster) -> bool:
     except Unavailable:
         return True
     return False
-
-
-def until(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.1)
 
 
 def test_a_stranger_is_not_let_in(tmp_path, heard, dask_processes):

@@ -292,7 +292,7 @@ DAMAGED = {
 
 
 def test_what_is_damaged_is_refused_and_the_service_goes_on(visitor, tmp_path):
-    """Oracle: what was done to the file; the next one is taken. All kinds: test_bad_files.py."""
+    """Oracle: what was done to the file; the next one is taken. All kinds: tests/engine/formats."""
     for name, (write, said) in DAMAGED.items():
         write(tmp_path / name)
         reply = visitor.upload((tmp_path / name).read_bytes(), name)

@@ -15,9 +15,6 @@ from ridetune.app.store import Store
 from sqlalchemy import event, text
 
 from .conftest import Visitor, open_client, short_recording
-from .test_jobs import clusters
-
-__all__ = ["clusters"]
 
 FILE = short_recording()
 

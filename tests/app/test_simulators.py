@@ -25,7 +25,7 @@ from ridetune.engine.measurement import read_run
 from ridetune.engine.simulation.rims_settings import RimsSettings
 
 from . import simulator_work as work
-from .conftest import SAMPLES
+from .conftest import SAMPLES, Visitor
 from .live import LiveService
 
 SAMPLE = SAMPLES / "detailed" / "manoeuvre_1.csv"
@@ -244,14 +244,9 @@ def test_told_to_end_with_the_service_they_go_on_with_what_they_do(two):
 
 def test_nothing_is_left_of_a_service_that_was_killed(tmp_path):
     with LiveService(tmp_path) as service:
-        made = service.client.post("/api/sessions").json()
+        visitor = Visitor(service.ready().client)
         asked = {"manoeuvre": "bump", "max_samples": 2}
-        token = {"Authorization": f"Bearer {made['token']}"}
-        deadline = time.monotonic() + 120
-        place = f"/api/sessions/{made['id']}/simulations"
-        while service.client.post(place, json=asked, headers=token).status_code != 200:
-            assert time.monotonic() < deadline
-            time.sleep(0.1)
+        assert visitor.post("/simulations", json=asked).status_code == 200
         children = psutil.Process(service.process.pid).children(recursive=True)
         assert len(children) > 2
         service.kill()

@@ -23,7 +23,7 @@ from ridetune.engine.vehicle_file import reference_vehicles, vehicle_to_json
 
 from .conftest import Visitor, open_client
 from .live import LiveService
-from .test_jobs import StandIn, until
+from .waiting import until
 
 RANGES = {"K_F": [1e4, 4e4], "chassis.mass": [900.0, 1300.0]}
 BOX = {"kind": "sobol", "ranges": RANGES, "cars": 12, "seed": 3}
@@ -244,8 +244,7 @@ def test_the_same_key_sweeps_once_however_the_parameters_are_called(engineer):
     assert (other.status_code, other.json()["field"]) == (422, "key")
 
 
-def test_a_file_that_would_not_fit_into_the_session_is_refused_at_once(tmp_path, monkeypatch):
-    monkeypatch.setattr("ridetune.app.main.Cluster", StandIn)
+def test_a_file_that_would_not_fit_into_the_session_is_refused_at_once(tmp_path, clusters):
     limits = Limits(session_bytes=3_000_000)
     with open_client(Settings(data=tmp_path, limits=limits)) as client:
         visitor = Visitor(client)
@@ -255,27 +254,23 @@ def test_a_file_that_would_not_fit_into_the_session_is_refused_at_once(tmp_path,
         assert (refused.status_code, "3 MB together" in refused.text) == (429, True)
 
 
-def test_what_goes_to_the_worker_is_everything_it_needs(tmp_path, monkeypatch):
+def test_what_goes_to_the_worker_is_everything_it_needs(tmp_path, clusters):
     """The same payload after a restart, though the session's car has changed."""
-    made = []
-    monkeypatch.setattr(
-        "ridetune.app.main.Cluster", lambda *place, **told: made.append(StandIn(*place)) or made[-1]
-    )
     settings = Settings(data=tmp_path)
     with open_client(settings) as client:
         visitor = Visitor(client)
         run = visitor.get("/measurements").json()[0]["id"]
         asked = {"manoeuvre": None, "duration": None, "rims": {"measurement": run}}
         job = submit(visitor, **asked)["id"]
-        until(lambda: f"{job}/0-11" in made[-1].tasks)
-        _, first, _ = made[-1].tasks[f"{job}/0-11"]
+        until(lambda: f"{job}/0-11" in clusters[-1].tasks)
+        _, first, _ = clusters[-1].tasks[f"{job}/0-11"]
         assert first["vehicle"] == PAPER
         assert "wheel.fl.z" in first["run"]
         assert visitor.delete(f"/measurements/{run}").status_code == 409
         visitor.put("/vehicle", json={**PAPER, "name": "another"})
     with open_client(settings):
-        until(lambda: f"{job}/0-11" in made[-1].tasks)
-        _, again, _ = made[-1].tasks[f"{job}/0-11"]
+        until(lambda: f"{job}/0-11" in clusters[-1].tasks)
+        _, again, _ = clusters[-1].tasks[f"{job}/0-11"]
         assert again["vehicle"] == PAPER
         assert_array_equal(again["run"]["chassis.a_x"], first["run"]["chassis.a_x"])
         assert {name: again[name] for name in again if name != "run"} == {

@@ -209,6 +209,15 @@ def take_car_without_brakes(visitor: Visitor) -> None:
     visitor.until("ridetune.state('vehicle').brakes == null")
 
 
+def free_only(visitor: Visitor, *symbols: str) -> None:
+    """Leave these parameters free and fix the others."""
+    visitor.click("#identification >> text=Set-up")
+    for row in visitor.element(".free tbody tr").all():
+        symbol = row.locator(".symbol").inner_text().replace("\n", "")
+        if symbol not in symbols:
+            row.locator("input[type=checkbox]").uncheck()
+
+
 def changed_pixels(one: np.ndarray, other: np.ndarray) -> float:
     """Share of the pixels that differ visibly."""
     return float(np.mean(np.abs(one.astype(int) - other).max(axis=2) > 24))

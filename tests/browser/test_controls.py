@@ -230,3 +230,17 @@ def test_runs_have_one_colour_everywhere(visitor):
     assert legend == readings == lines
     assert lines[1] == f"rgb{GHOST}"
     assert lines[2] == f"rgb{EDGES}"
+
+
+def test_a_known_number_keeps_the_hand_in_its_field(visitor):
+    visitor.click("#tab-car")
+    mass, next_one = visitor.element("[title='chassis.mass'] input"), ".known input >> nth=1"
+    mass.fill("1100")
+    mass.press("Tab")
+    visitor.until("ridetune.state('vehicle').chassis.mass === 1100")
+    visitor.settled()
+    assert visitor.element(next_one).evaluate("(field) => field === document.activeElement")
+    # An empty field is no zero.
+    mass.fill("")
+    mass.press("Tab")
+    assert mass.input_value() == "1100"

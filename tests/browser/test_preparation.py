@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from ridetune.engine.manoeuvre import manoeuvre_to_json, reference_manoeuvres
 
-from .conftest import Visitor, add_file, take_car_without_brakes
-from .test_identification import free_only
+from .conftest import Visitor, add_file, free_only, take_car_without_brakes
 
 pytestmark = pytest.mark.browser
 

@@ -51,3 +51,9 @@ def guessed(table: HeldTable) -> Guess:
 def guessed_name(name: str, unit: str = "", comment: str = "") -> Guess:
     """What is proposed for a single column by its header alone."""
     return guess([Column(name, unit, 100, comment=comment)], {})
+
+
+def proposed(name: str, unit: str = "") -> tuple[str, str] | None:
+    """(channel, unit) that a header alone is proposed as, None for nothing."""
+    one = guessed_name(name, unit).chosen.get(0)
+    return one and (one.channel, one.unit)

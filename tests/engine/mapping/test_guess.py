@@ -5,183 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
-from ridetune.engine.channels import CHANNELS, channel
 from ridetune.engine.formats.csv_file import CsvFile
 from ridetune.engine.formats.table import Column, HeldTable
+from ridetune.engine.frames import CORNERS
 from ridetune.engine.mapping.apply import apply
-from ridetune.engine.mapping.guess import THRESHOLD, chosen_by_hand, guess
 from ridetune.engine.mapping.mapping import ChannelMapping, MappedColumn
 from ridetune.engine.mapping.survey import survey
 
-from .mapped_tables import guessed, guessed_name, held, renamed, truth
-
-CORNERS = ("fl", "fr", "rl", "rr")
-
-
-def proposed(name, unit=""):
-    """(channel, unit) that a header alone is proposed as, None for nothing."""
-    one = guessed_name(name, unit).chosen.get(0)
-    return one and (one.channel, one.unit)
-
-
-# --- names ------------------------------------------------------------------------------------
-
-KNOWN_NAMES = [
-    ("Time", "s", "time"),
-    ("Zeit", "s", "time"),
-    ("t", "s", "time"),
-    ("Car.CFL.tz", "m", "wheel.fl.z"),
-    ("Car.CRR.tz", "m", "wheel.rr.z"),
-    ("Car.ax", "m/s^2", "chassis.a_x"),
-    ("Car.vx", "m/s", "chassis.v_x"),
-    ("Car.v", "m/s", "chassis.v_x"),
-    ("Car.tz", "m", "chassis.z"),
-    ("Car.Pitch", "rad", "chassis.pitch"),
-    ("Car.PitchVel", "rad/s", "chassis.pitch_rate"),
-    ("Car.FzFL", "N", "tyre.fl.load"),
-    ("Vhcl.Roll", "rad", "chassis.roll"),
-    ("Vhcl.sRoad", "m", "chassis.x"),
-    ("a_x_Vehicle_CoG[m|s2]", "", "chassis.a_x"),
-    ("v_x_Vehicle_CoG[km|h]", "", "chassis.v_x"),
-    ("z_Wheel_FL[m]", "", "wheel.fl.z"),
-    ("chassis_displacements.vertical", "mm", "chassis.z"),
-    ("chassis_accelerations.longitudinal", "g", "chassis.a_x"),
-    ("wheel_displacement.vertical_left_front", "mm", "wheel.fl.z"),
-    ("velocity kmh", "", "chassis.v_x"),
-    ("Longitudinal acceleration", "g", "chassis.a_x"),
-    ("pitch rate", "deg/s", "chassis.pitch_rate"),
-    ("gyro_y", "deg/s", "chassis.pitch_rate"),
-    ("Nickwinkel", "°", "chassis.pitch"),
-    ("Wankwinkel", "Grad", "chassis.roll"),
-    ("Wankrate", "°/s", "chassis.roll_rate"),
-    ("Längsbeschleunigung", "m/s²", "chassis.a_x"),
-    ("Laengsbeschl.", "g", "chassis.a_x"),
-    ("Fahrzeuggeschwindigkeit", "km/h", "chassis.v_x"),
-    ("Aufbauhub", "mm", "chassis.z"),
-    ("Vertikalweg Aufbau", "mm", "chassis.z"),
-    ("Radhub VL", "mm", "wheel.fl.z"),
-    ("Rad vorne links z", "mm", "wheel.fl.z"),
-    ("Radmittelpunkt_z_HL", "mm", "wheel.rl.z"),
-    ("Weg_Rad_HR", "mm", "wheel.rr.z"),
-    ("Federweg_VR", "mm", "suspension.fr.travel"),
-    ("Einfederung HL", "mm", "suspension.rl.travel"),
-    ("Radlast VR", "N", "tyre.fr.load"),
-    ("wheel_front_left_z", "mm", "wheel.fl.z"),
-    ("WheelFLz", "mm", "wheel.fl.z"),
-    ("rim centre FL z", "mm", "wheel.fl.z"),
-    ("hub_z_RR", "mm", "wheel.rr.z"),
-    ("axle_disp_lr", "mm", "wheel.rl.z"),
-    ("string pot LF", "mm", "suspension.fl.travel"),
-    ("damper_pos_RR", "mm", "suspension.rr.travel"),
-    ("susp travel rear left", "mm", "suspension.rl.travel"),
-    ("heave", "mm", "chassis.z"),
-    ("bounce", "m", "chassis.z"),
-    ("VehSpd", "kph", "chassis.v_x"),
-    ("AccelX", "g", "chassis.a_x"),
-    ("SeatDriver_az", "m/s^2", "seat.driver.a_z"),
-    ("BrakeTrq_FL", "Nm", "brake.fl.torque"),
-    ("AccY", "g", "chassis.body_a_y"),
-    ("heave acceleration", "m/s^2", "chassis.body_a_z"),
-    ("Wheel Speed FL", "km/h", "wheel.fl.speed"),
-    ("Radgeschwindigkeit HR", "km/h", "wheel.rr.speed"),
-    ("Wheel_FL_az", "m/s^2", "wheel.fl.a_z"),
-    ("HubAcc_Z_RL", "g", "wheel.rl.a_z"),
-    ("Beschleunigung Radträger VR", "g", "wheel.fr.a_z"),
-]
-
-
-@pytest.mark.parametrize(("name", "unit", "expected"), KNOWN_NAMES)
-def test_usual_names_are_known(name, unit, expected):
-    assert proposed(name, unit)[0] == expected
-
-
-@pytest.mark.parametrize("known", ["time", *CHANNELS])
-def test_our_own_names_are_themselves(known):
-    assert proposed(known, channel(known).unit) == (known, channel(known).unit)
-
-
-@pytest.mark.parametrize(
-    ("name", "unit"),
-    [
-        ("Yaw rate", "deg/s"),
-        ("Wheel Speed FL", "rad/s"),
-        ("Wheel_FL_ay", "m/s^2"),
-        ("Lenkradwinkel", "deg"),
-        ("latitude", "deg"),
-        ("Car.PitchAcc", "rad/s^2"),
-        ("Oil temperature", "degC"),
-        ("Bremsdruck VL", "bar"),
-        ("signal 7", "mm"),
-        ("", ""),
-    ],
-)
-def test_other_quantities_are_left_alone(name, unit):
-    assert proposed(name, unit) is None
-
-
-WHEEL, BODY, GERMAN = ("wheel", "whl", "rim", "rad"), ("body", "chassis", "aufbau"), ("z", "weg")
-CORNER_WORDS = {
-    "fl": (("front", "left"), ("fl",), ("lf",), ("vl",), ("vorne", "links")),
-    "fr": (("front", "right"), ("fr",), ("rf",), ("vr",), ("vorn", "rechts")),
-    "rl": (("rear", "left"), ("rl",), ("lr",), ("hl",), ("hinten", "links")),
-    "rr": (("rear", "right"), ("rr",), ("hr",), ("rechts", "hinten")),
-}
-SUBJECTS = {
-    **{
-        f"wheel.{corner}.z": [(w, *c) for w in WHEEL for c in CORNER_WORDS[corner]]
-        for corner in CORNERS
-    },
-    "chassis.z": [(word,) for word in BODY],
-    "chassis.pitch": [("pitch",), ("nick",), ("body", "pitch"), ("chassis", "pitch", "angle")],
-    "chassis.roll": [("roll", "angle"), ("wank", "winkel"), ("vehicle", "roll")],
-    "chassis.a_x": [("acc", "x"), ("accel", "long"), ("laengs", "beschleunigung"), ("body", "ax")],
-    "chassis.v_x": [
-        ("vehicle", "speed"),
-        ("geschwindigkeit",),
-        ("car", "velocity"),
-        ("speed", "x"),
-    ],
-}
-HEIGHTS = ("z", "disp", "vertical", "weg", "pos")
-STYLES = {
-    "snake": "_".join,
-    "dots": ".".join,
-    "spaces": " ".join,
-    "dashes": "-".join,
-    "camel": lambda words: "".join(word.capitalize() for word in words),
-    "shout": lambda words: "_".join(words).upper(),
-}
-UNITS = {"m": ["m", "mm", "cm"], "rad": ["rad", "deg", "°"], "m/s": ["m/s", "km/h"]}
-UNITS["m/s^2"] = ["m/s^2", "m/s²", "g"]
-
-
-@settings(max_examples=200, deadline=None)
-@given(data=st.data())
-def test_words_of_a_channel_are_found_however_they_are_written(data):
-    """Subject and quantity in either order, joined in any style, in any unit of the quantity."""
-    known = data.draw(st.sampled_from(sorted(SUBJECTS)))
-    words = list(data.draw(st.sampled_from(SUBJECTS[known])))
-    if known.endswith(".z"):
-        height = ["z"] if known == "chassis.z" else [data.draw(st.sampled_from(HEIGHTS))]
-        words = data.draw(st.sampled_from([words + height, height + words]))
-    name = STYLES[data.draw(st.sampled_from(sorted(STYLES)))](words)
-    unit = data.draw(st.sampled_from(UNITS[channel(known).unit]))
-    assert proposed(name, unit) == (known, unit), name
-
-
-@settings(max_examples=200, deadline=None)
-@given(st.lists(st.tuples(st.text(max_size=60), st.text(max_size=12)), min_size=1, max_size=6))
-@example([("uV0gB", ""), ("uV0gB", "")])
-def test_any_header_is_taken_without_failing_and_no_channel_twice(header):
-    found = guess([Column(name, unit, 100) for name, unit in header], {})
-    channels = [one.channel for one in found.mapping.columns]
-    assert len(channels) == len(set(channels))
-    assert all(one.confidence >= THRESHOLD for one in found.chosen.values())
-
-
-# --- whole files ------------------------------------------------------------------------------
+from .mapped_tables import guessed, held, renamed, truth
 
 SCHEMES = {
     "CarMaker": {
@@ -254,122 +85,39 @@ def test_a_unit_that_lies_is_said_with_the_numbers_that_give_it_away():
     assert all(one.doubted for one in found.chosen.values() if "lies" in one.reason)
 
 
-# --- units ------------------------------------------------------------------------------------
+def test_a_template_that_fits_is_proposed_in_place_of_the_guess():
+    table = renamed(truth(), SCHEMES["German"])
+    other = ChannelMapping((MappedColumn("Nickwinkel", "chassis.roll", "deg", sign=-1),))
+    missing = ChannelMapping((MappedColumn("not there", "chassis.roll", "mrad"),))
+    found = survey(table).with_templates({"a": missing, "b": other})
+    assert (found.template, found.guess.mapping) == ("b", other)
+    [one] = found.guess.chosen.values()
+    assert (one.channel, one.unit, one.sign, one.reason) == ("chassis.roll", "deg", -1, "template")
+    assert survey(table).with_templates({"a": missing}).template == ""
 
 
-@pytest.mark.parametrize(
-    ("name", "stated", "taken"),
-    [
-        ("acc_x", "g", "g"),
-        ("acc_x", "G", "G"),
-        ("brake torque fl", "Nm", "Nm"),
-        ("pitch", "Grad", "deg"),
-        ("acc_x", "m|s2", "m/s2"),
-        ("acc_x", "[m/sec^2]", "m/s^2"),
-        ("roll rate", "deg/sec", "deg/s"),
-        ("speed", "kph", "kph"),
-    ],
-)
-def test_units_that_mean_something_else_to_others(name, stated, taken):
-    """g is no gram, G no gauss, Nm no number, Grad no gradian."""
-    assert proposed(name, stated)[1] == taken
-
-
-@pytest.mark.parametrize(
-    ("name", "stated", "factor"),
-    [("acc_x", "G", 9.80665), ("pitch", "Grad", np.pi / 180), ("accel_x", "m|s2", 1.0)],
-)
-def test_their_numbers_become_si(name, stated, factor):
-    """Oracle: standard gravity, degrees, and hours of 3600 s."""
+def test_a_template_in_another_unit_than_the_file_states_is_doubted():
+    """The template comes from a file in mm; spellings of a unit are no other unit."""
     time = np.arange(0.0, 5.0, 0.01)
-    table = held({"Time": ("s", time), name: (stated, np.sin(time))})
-    run = apply(guessed(table).mapping, table)
-    np.testing.assert_allclose(run[run.columns[0]], factor * np.sin(time), rtol=1e-12)
-
-
-@pytest.mark.parametrize("stated", ["", "-", "1"])
-def test_without_a_unit_the_numbers_decide(stated):
-    """Wheels move centimetres: what reaches 30 is in mm, what reaches 0.03 in m."""
-    time = np.arange(0.0, 5.0, 0.01)
-    for size, unit in ((30.0, "mm"), (0.03, "m")):
-        table = held({"Time": ("s", time), "Rad VL z": (stated, size * np.sin(time))})
-        [one] = [one for one in guessed(table).chosen.values() if one.channel == "wheel.fl.z"]
-        assert one.unit == unit
-        assert one.reason.startswith("name only; values to")
-        assert one.confidence < 0.9
-
-
-@pytest.mark.parametrize(("size", "unit"), [(30.0, "mm"), (0.009, "m")])
-def test_a_column_chosen_by_hand_takes_its_unit_from_its_numbers(size, unit):
-    """Its name tells nothing of a wheel; the wheel's size is that of the rule for a guess."""
-    time = np.arange(0.0, 5.0, 0.01)
-    found = survey(held({"Time": ("s", time), "whl_z(1)": ("", size * np.sin(time))}))
-    one = chosen_by_hand(found.columns[1], found.known[1], "wheel.fl.z")
-    assert (one.channel, one.unit, one.sign, one.doubted) == ("wheel.fl.z", unit, 1, True)
-    assert one.reason == f"choice only; values to {size:.4g} fit {unit}"
-
-
-@pytest.mark.parametrize(
-    ("name", "stated", "unit", "doubted"),
-    [("c1", "mm", "mm", False), ("wheel_mm", "", "mm", False), ("c1", "m", "mm", True)],
-)
-def test_a_column_chosen_by_hand_keeps_the_unit_that_its_numbers_fit(name, stated, unit, doubted):
-    time = np.arange(0.0, 5.0, 0.01)
-    found = survey(held({"Time": ("s", time), name: (stated, 30.0 * np.sin(time))}))
-    one = chosen_by_hand(found.columns[1], found.known[1], "wheel.fl.z")
-    assert (one.unit, one.doubted) == (unit, doubted)
-
-
-def test_a_unit_of_another_quantity_is_not_followed():
-    """A pitch in seconds is offered as a candidate with its doubt, not proposed."""
-    found = guessed_name("pitch", "s")
-    assert not found.chosen
-    [one] = found.candidates[0]
-    assert one.channel == "chassis.pitch"
-    assert "its unit s measures time" in one.reason
-
-
-def test_angle_by_unit_is_a_rate_by_unit():
-    assert proposed("pitch", "deg/s") == ("chassis.pitch_rate", "deg/s")
-    assert proposed("Nick", "deg") == ("chassis.pitch", "deg")
-
-
-# --- signs ------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("name", "comment", "sign"),
-    [
-        ("pitch", "nose up positive", -1),
-        ("pitch", "positive nose down", 1),
-        ("roll", "right side up", -1),
-        ("heave", "z down", -1),
-        ("heave", "positive down", -1),
-        ("Verzoegerung", "", -1),
-        ("damper travel fl", "rebound positive", -1),
-        ("acc_x", "", 1),
-        ("acc_x", "rearward positive", -1),
-        ("LaengsVerzoegerung", "", -1),
-        ("pitch_NoseUp", "", -1),
-        ("acc_x", "acceleration (positive) / deceleration (negative)", 1),
-        ("acc_x", "by backward difference", 1),
-        ("heave", "not z-down", 1),
-        ("heave", "z down is negative", 1),
-        ("roll", "signal of right update rate", 1),
-        ("roll", "left side up, right side down", 1),
-        ("pitch", "negative for nose up", 1),
-        ("pitch", "not calibrated, nose up", -1),
-    ],
-)
-def test_a_stated_sign_is_followed(name, comment, sign):
-    units = {"pitch": "deg", "roll": "deg", "pitch_NoseUp": "deg", "heave": "mm"}
-    unit = units.get(name, "mm" if "travel" in name else "g")
-    found = guessed_name(name, unit, comment)
-    assert found.chosen[0].sign == sign
-    assert [f"{name} is taken as" in one for one in found.warnings] == [True] * (sign < 0)
-
-
-# --- rivals and numbers -----------------------------------------------------------------------
+    entries = (
+        MappedColumn("z", "chassis.z", "mm"),
+        MappedColumn("ax", "chassis.a_x", "m/s^2"),
+        MappedColumn("roll", "chassis.roll", "deg"),
+    )
+    table = held(
+        {
+            "z": ("cm", 2.0 * np.sin(time)),
+            "ax": ("m|s2", np.sin(time)),
+            "roll": ("", np.sin(time)),
+        }
+    )
+    found = survey(table).with_templates({"mm": ChannelMapping(entries)})
+    doubted = [(one.doubted, one.confidence < 1.0) for one in found.guess.chosen.values()]
+    assert doubted == [(True, True), (False, False), (False, False)]
+    [said] = found.warnings
+    assert said.startswith("z is in cm by the file, but the template takes chassis.z in mm")
+    same = replace(entries[0], unit="cm")
+    assert not survey(table).with_templates({"cm": ChannelMapping((same,))}).warnings
 
 
 def test_of_two_columns_that_fit_the_first_is_proposed_and_the_other_named():
@@ -477,38 +225,3 @@ def test_of_a_file_too_large_only_what_may_be_a_channel_is_read(monkeypatch):
     assert sorted(survey(table).known) == [0, 1, 2]
     monkeypatch.setattr("ridetune.engine.mapping.survey.MOST_SURVEYED", 1499)
     assert sorted(survey(table).known) == [0, 2]
-
-
-def test_a_template_that_fits_is_proposed_in_place_of_the_guess():
-    table = renamed(truth(), SCHEMES["German"])
-    other = ChannelMapping((MappedColumn("Nickwinkel", "chassis.roll", "deg", sign=-1),))
-    missing = ChannelMapping((MappedColumn("not there", "chassis.roll", "mrad"),))
-    found = survey(table).with_templates({"a": missing, "b": other})
-    assert (found.template, found.guess.mapping) == ("b", other)
-    [one] = found.guess.chosen.values()
-    assert (one.channel, one.unit, one.sign, one.reason) == ("chassis.roll", "deg", -1, "template")
-    assert survey(table).with_templates({"a": missing}).template == ""
-
-
-def test_a_template_in_another_unit_than_the_file_states_is_doubted():
-    """The template comes from a file in mm; spellings of a unit are no other unit."""
-    time = np.arange(0.0, 5.0, 0.01)
-    entries = (
-        MappedColumn("z", "chassis.z", "mm"),
-        MappedColumn("ax", "chassis.a_x", "m/s^2"),
-        MappedColumn("roll", "chassis.roll", "deg"),
-    )
-    table = held(
-        {
-            "z": ("cm", 2.0 * np.sin(time)),
-            "ax": ("m|s2", np.sin(time)),
-            "roll": ("", np.sin(time)),
-        }
-    )
-    found = survey(table).with_templates({"mm": ChannelMapping(entries)})
-    doubted = [(one.doubted, one.confidence < 1.0) for one in found.guess.chosen.values()]
-    assert doubted == [(True, True), (False, False), (False, False)]
-    [said] = found.warnings
-    assert said.startswith("z is in cm by the file, but the template takes chassis.z in mm")
-    same = replace(entries[0], unit="cm")
-    assert not survey(table).with_templates({"cm": ChannelMapping((same,))}).warnings
