@@ -6,18 +6,14 @@ Whoever reads a file here waits until a child may be started, so that there are 
 than the settings allow.
 """
 
-import hashlib
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from ..engine.channels import channel
 from ..engine.errors import MeasurementError, UnmappedError
 from ..engine.remembered import Remembered
 from ..engine.run import Run
@@ -25,6 +21,7 @@ from ..engine.run_notes import doubtful_noise
 from ..engine.step_record import step_records_from_json
 from .errors import Deleted, NotFound
 from .measurement import Measurement, NewMeasurement, done_to, read_as
+from .recording_summary import summary, unmapped_summary
 from .runs import size
 from .storage import trouble_of
 from .store import Store
@@ -62,7 +59,7 @@ class Recordings:
         """The recording as it is used: with what is done to it, as `raw` where that is nothing."""
         if measurement.conditioning is None:
             return self.raw(measurement)
-        # It brings scipy, which is loaded with the first simulation.
+        # It brings scipy, which takes long to load.
         from ..engine.conditioning.chain import condition, steps_from_json
         from ..engine.vehicle_file import vehicle_from_json
 
@@ -214,7 +211,7 @@ def _by_names(
     try:
         run = _run(table, None, noise)
     except UnmappedError as error:
-        return _unmapped_summary(table, error), dict(noise)
+        return unmapped_summary(table, error), dict(noise)
     return summary(run), dict(run.noise)
 
 
@@ -259,79 +256,3 @@ def as_stated(
         conditioning=kept.get("conditioning"),
         conditioned=kept.get("conditioned"),
     )
-
-
-def summary(
-    run: Run, mapping: Mapping[str, Any] | None = None, raw: Run | None = None
-) -> dict[str, Any]:
-    """What a person wants to know of a recording before using it.
-
-    mapping : that of its columns, in which signs may be confirmed; None for our own names
-    raw : the recording before anything was done to it, where that is another
-    """
-    from ..engine.mapping.mapping import mapping_from_json
-    from ..engine.mapping.signs import check_signs
-    from ..engine.measurement import missing_for_identification
-
-    missing = list(missing_for_identification(run))
-    sure = () if mapping is None else mapping_from_json(mapping).sure_signs
-    return {
-        "needs_mapping": False,
-        "samples": len(run.time),
-        "duration": run.duration,
-        "sample_step": run.sample_step,
-        "channels": [_channel(name, run) for name in run.columns],
-        "warnings": list(run.warnings),
-        "usable_for_identification": not missing,
-        "missing": missing,
-        "sign_suggestions": [asdict(one) for one in check_signs(run, sure)],
-        "data_sha256": _digest(raw or run),
-        "vehicle": run.vehicle or None,
-        "plant": run.plant or None,
-    }
-
-
-def _unmapped_summary(table: "Table", reason: MeasurementError) -> dict[str, Any]:
-    """The same of a file that needs a mapping: what is missing is missing in the guess, too."""
-    from ..engine.mapping.survey import survey
-    from ..engine.measurement import missing_for_identification
-    from ..engine.plausibility import require_samples
-
-    found = survey(table)
-    samples = max((one.samples for one in found.columns), default=0)
-    require_samples(samples, found.source)
-    nothing = np.arange(2.0)
-    guessed = {one.channel: nothing for one in found.guess.mapping.columns if one.channel != "time"}
-    return {
-        "needs_mapping": True,
-        "samples": samples,
-        "duration": 0.0,
-        "sample_step": 0.0,
-        "channels": [],
-        "warnings": [str(reason), *found.warnings],
-        "usable_for_identification": False,
-        "missing": list(missing_for_identification(Run(found.source, nothing, guessed))),
-        "sign_suggestions": [],
-        "vehicle": None,
-        "plant": None,
-    }
-
-
-def _digest(run: Run) -> str:
-    """What stands for a run's samples, however its file writes them."""
-    made = hashlib.sha256()
-    for name in ("time", *sorted(run.columns)):
-        made.update(name.encode())
-        made.update(np.ascontiguousarray(run[name], dtype=float).tobytes())
-    return made.hexdigest()
-
-
-def _channel(name: str, run: Run) -> Mapping[str, Any]:
-    values = run[name]
-    return {
-        "name": name,
-        "unit": channel(name).unit,
-        "minimum": float(values.min()),
-        "maximum": float(values.max()),
-        "rms": float(np.sqrt(np.mean(values**2))),
-    }

@@ -36,7 +36,7 @@ async def set_conditioning(
 
 
 def _condition(services: Services, sid: str, mid: str, body: ConditioningRequest) -> dict[str, Any]:
-    # They bring scipy, which is loaded with the first simulation.
+    # They bring scipy, which takes long to load.
     from ..engine.conditioning.chain import needs_vehicle, steps_from_json, steps_to_json
     from ..engine.vehicle_file import vehicle_from_json, vehicle_to_json
 

@@ -165,7 +165,7 @@ async def set_manoeuvre(
 
 
 def _driven(services: Services, received: Upload) -> dict[str, Any]:
-    # It brings scipy, which is loaded with the first simulation.
+    # It brings scipy, which takes long to load.
     from ..engine.manoeuvre import manoeuvre_from_json, manoeuvre_to_json
 
     data = received.read(services.settings.limits.body_bytes)

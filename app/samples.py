@@ -10,7 +10,7 @@ from ..engine.remembered import Remembered
 from ..engine.run_notes import manoeuvre_beside
 from .measurement import NewMeasurement
 from .package_files import package_folder
-from .recordings import summary
+from .recording_summary import summary
 from .simulator import Host
 
 FOLDER = "detailed"
