@@ -9,6 +9,7 @@ Dask forgets everything with its scheduler; what must last is the caller's busin
 
 import asyncio
 import logging
+import math
 import os
 import secrets
 import threading
@@ -30,6 +31,9 @@ log = logging.getLogger(__name__)
 
 LOOK_EVERY = 2.0
 """Time between two looks at a scheduler elsewhere, s."""
+
+REFUSED_FOR = 10.0
+"""How long a failed try to reach the workers counts, s: several tries while jobs wait for them."""
 
 
 class Listener(Protocol):
@@ -88,8 +92,14 @@ class Cluster:
         self._scheduler, self._there, self._looked = "", 0, 0.0
         self._leave: threading.Timer | None = None
         self._closed = False
+        self._refused_at, self._told = -math.inf, ""
         self.became: Counter[str] = Counter()
         """How many tasks were submitted, and how many were done, failed, cancelled or lost."""
+
+    @property
+    def refused(self) -> bool:
+        """Whether the last try to reach them failed, lately."""
+        return time.monotonic() - self._refused_at < REFUSED_FOR
 
     def workers(self) -> int:
         """How many there are now; 0 while none are needed, or can be reached."""
@@ -198,10 +208,18 @@ class Cluster:
             )
             self._client.subscribe_topic(worker.TOPIC, self._heard)
         except Exception as error:
-            unforeseen = not isinstance(error, OSError | RuntimeError)
-            log.error("cannot reach the workers %s: %s", self._where, error, exc_info=unforeseen)
+            self._refused_at = time.monotonic()
+            if str(error) != self._told:  # not again every time it is tried
+                self._told = str(error)
+                unforeseen = not isinstance(error, OSError | RuntimeError)
+                told = "cannot reach the workers %s, which is tried on: %s"
+                log.error(told, self._where, error, exc_info=unforeseen)
             self._disconnect()
             raise self._unavailable() from None
+        self._refused_at = -math.inf
+        if self._told:
+            self._told = ""
+            log.warning("reached the workers %s again", self._where)
 
     @property
     def _where(self) -> str:

@@ -189,7 +189,12 @@ def _services(
         warmup=warmup,
         draining=draining,
         readiness=Readiness(
-            draining, warmup, store.database, store.directory.path, settings.cluster
+            draining,
+            warmup,
+            store.database,
+            store.directory.path,
+            settings.cluster,
+            lambda: cluster.refused,
         ),
         metrics=metrics,
         callers=Callers(settings.limits),

@@ -29,7 +29,7 @@ PATIENCE = 1.0
 KEPT_FOR = 1.0
 SCHEDULER_PORT = 8786
 
-State = Literal["ready", "compiling", "draining", "failed"]
+State = Literal["ready", "degraded", "compiling", "draining", "failed"]
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,19 @@ class Part:
         """Whether it does its work."""
         return self.state == "ready"
 
+    @property
+    def serves(self) -> bool:
+        """Whether requests can be sent here, be it that some of them wait."""
+        return self.state in ("ready", "degraded")
+
+
+@dataclass(frozen=True)
+class _Look:
+    """How a part is looked at, and what is said where that fails."""
+
+    look: Callable[[], Awaitable[object]]
+    failed: Part
+
 
 class Readiness:
     """The parts of one service; for the event loop."""
@@ -55,25 +68,28 @@ class Readiness:
         database: Database,
         data: Path,
         cluster: str,
+        refused: Callable[[], bool] = lambda: False,
         *,
         clock: Callable[[], float] = time.monotonic,
     ):
-        """`data` is the data directory, `cluster` a scheduler's address or empty."""
+        """`data` is the data directory, `cluster` a scheduler's address or empty; `refused` tells
+        whether jobs were lately refused there, by its certificate for one.
+        """
         self._draining, self._warmup, self._clock = draining, warmup, clock
-        self._looks: dict[str, tuple[Callable[[], Awaitable[object]], str]] = {
-            "database": (
+        self._looks = {
+            "database": _Look(
                 _Apart(lambda: _read(database)),
-                "The database does not answer.",
+                Part("failed", "The database does not answer."),
             ),
-            "data_directory": (
+            "data_directory": _Look(
                 _Apart(lambda: _write(data)),
-                "The data directory cannot be written, or its disk is full.",
+                Part("failed", "The data directory cannot be written, or its disk is full."),
             ),
         }
         if cluster:
-            self._looks["cluster"] = (
-                lambda: _reach(cluster),
-                "The job workers' scheduler cannot be reached; jobs wait for it.",
+            self._looks["cluster"] = _Look(
+                lambda: _reach(cluster, refused),
+                Part("degraded", "The job workers cannot be reached; jobs wait for them."),
             )
         self._seen: dict[str, Part] = {}
         self._looked = -KEPT_FOR
@@ -94,13 +110,13 @@ class Readiness:
         }
 
     async def _look(self, name: str) -> Part:
-        look, complaint = self._looks[name]
+        how = self._looks[name]
         try:
-            await asyncio.wait_for(look(), PATIENCE)
+            await asyncio.wait_for(how.look(), PATIENCE)
         except Exception as error:
             if name not in self._seen or self._seen[name].ready:
                 log.warning("%s is not ready: %r", name, error)
-            return Part("failed", complaint)
+            return how.failed
         return Part("ready", "Ready.")
 
 
@@ -135,8 +151,10 @@ def _write(folder: Path) -> None:
         file.flush()
 
 
-async def _reach(address: str) -> None:
-    """Connect to a scheduler at `tls://host:port`."""
+async def _reach(address: str, refused: Callable[[], bool]) -> None:
+    """Connect to a scheduler at `tls://host:port`; OSError too where jobs were refused there."""
+    if refused():
+        raise ConnectionRefusedError("jobs were refused")
     place = urlsplit(address if "//" in address else f"//{address}")
     _, writer = await asyncio.open_connection(place.hostname, place.port or SCHEDULER_PORT)
     writer.close()

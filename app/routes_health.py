@@ -17,14 +17,15 @@ async def healthz() -> dict[str, str]:
     return {"state": "running"}
 
 
-@router.get("/readyz", responses={503: {"description": "Not all of it; which part is not ready."}})
+@router.get("/readyz", responses={503: {"description": "It does not; which part is not ready."}})
 async def readyz(services: Shared) -> JSONResponse:
-    """The service does its work: 200 with all of its parts, else 503; state and sentence of the
-    first that is not ready, and of each part.
+    """The service does its work: 200, be it that jobs wait (`degraded`), else 503; state and
+    sentence of the worst part, and of each.
     """
     parts = await services.readiness.parts()
-    worst = next((part for part in parts.values() if not part.ready), parts["kernels"])
+    wanting = sorted((one for one in parts.values() if not one.ready), key=lambda one: one.serves)
+    worst = wanting[0] if wanting else parts["kernels"]
     body: dict[str, Any] = asdict(worst) | {
         "parts": {name: asdict(part) for name, part in parts.items()}
     }
-    return JSONResponse(body, 200 if worst.ready else 503)
+    return JSONResponse(body, 200 if worst.serves else 503)

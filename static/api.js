@@ -81,8 +81,8 @@ async function frames(...args) {
 
 // The service's tables
 /**
- * {state, message}; a 503 while compiling is an answer, not a failure. Job workers out of reach (the part
- * `cluster`) keep the page from nothing else.
+ * {state, message}; a 503 while compiling is an answer, not a failure. That jobs wait (`degraded`) keeps
+ * the page from nothing else.
  */
 export async function readiness() {
   let reply;
@@ -92,8 +92,7 @@ export async function readiness() {
     throw new Refusal({ title: "No connection", detail: "The service does not answer." });
   }
   const answer = await reply.json().catch(() => ({}));
-  const awaited = Object.entries(answer.parts ?? {}).filter(([, part]) => part.state !== "ready");
-  if (awaited.length === 1 && awaited[0][0] === "cluster") return { ...answer, state: "ready" };
+  if (answer.state === "degraded") return { ...answer, state: "ready" };
   return { state: answer.state ?? (reply.ok ? "ready" : "compiling"), ...answer };
 }
 export const parameters = () => json("GET", "/api/parameters");

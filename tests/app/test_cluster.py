@@ -403,8 +403,10 @@ def test_a_stranger_is_not_let_in(tmp_path, heard, dask_processes):
     strangers = make_certificates(tmp_path)
     with config.set({"distributed.comm.timeouts.connect": "2s"}):
         cluster = Cluster(dask_processes.address, tmp_path, certificates=strangers)
+        assert not cluster.refused
         with pytest.raises(Unavailable):
             cluster.submit("stranger", tasks.double, 1, heard)
+        assert cluster.refused
         cluster.close()
 
 
@@ -419,8 +421,10 @@ def test_workers_that_cannot_be_reached_are_a_sentence(tmp_path, heard, monkeypa
         cluster.close()
 
 
-def test_a_scheduler_that_stays_away_costs_no_more_each_time_it_is_tried(tmp_path, monkeypatch):
-    """Neither threads nor open files, however long that lasts."""
+def test_a_scheduler_that_stays_away_costs_no_more_each_time_it_is_tried(
+    tmp_path, monkeypatch, caplog
+):
+    """Neither threads nor open files nor lines in the log, however long that lasts."""
     monkeypatch.setattr("ridetune.app.dask_connection.CONNECT", 0.2)
     cluster = Cluster("tcp://127.0.0.1:9", tmp_path)
     assert is_away(cluster)  # Dask has threads that all its clients share
@@ -429,4 +433,6 @@ def test_a_scheduler_that_stays_away_costs_no_more_each_time_it_is_tried(tmp_pat
         assert is_away(cluster)
     assert threading.active_count() <= threads
     assert psutil.Process().num_fds() <= files
+    told = [one.message for one in caplog.records if one.name == "ridetune.app.cluster"]
+    assert [message.partition(":")[0] for message in told] == ["cannot reach the workers at tcp"]
     cluster.close()

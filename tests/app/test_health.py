@@ -68,11 +68,21 @@ def test_what_is_not_ready_is_told_by_its_name_and_not_where_it_is(tmp_path):
         (tmp_path / "gone").rename(settings.data)
     assert reply.status_code == 503
     parts = reply.json()["parts"]
-    failed = [name for name, part in parts.items() if part["state"] == "failed"]
-    assert failed == ["data_directory", "cluster"]
+    told = {name: part["state"] for name, part in parts.items() if part["state"] != "ready"}
+    assert told == {"data_directory": "failed", "cluster": "degraded"}
     assert reply.json()["message"] == parts["data_directory"]["message"]
     assert "127.0.0.1" not in reply.text
     assert str(tmp_path) not in reply.text
+
+
+def test_workers_out_of_reach_keep_no_request_away(tmp_path):
+    """Only jobs wait for them; a balancer that took every service out would stop the rest, too."""
+    settings = Settings(data=tmp_path / "data", cluster="tls://127.0.0.1:9")
+    with open_client(settings) as client:
+        reply = client.get("/readyz")
+    told = reply.json()
+    assert (reply.status_code, told["state"]) == (200, "degraded")
+    assert told["message"] == told["parts"]["cluster"]["message"]
 
 
 def test_a_service_that_is_about_to_end_is_not_ready(client):
@@ -88,6 +98,13 @@ def test_a_scheduler_that_listens_is_reached(tmp_path, warm, form):
         address = form.format(scheduler.getsockname()[1])
         ready = Readiness(Draining(), warm, Base(), tmp_path, address)
         assert states(in_a_loop(ready.parts))["cluster"] == "ready"
+
+
+def test_a_scheduler_that_refuses_the_service_is_not_ready(tmp_path, warm):
+    with socket.create_server(("127.0.0.1", 0)) as scheduler:
+        address = f"tls://127.0.0.1:{scheduler.getsockname()[1]}"
+        ready = Readiness(Draining(), warm, Base(), tmp_path, address, lambda: True)
+        assert states(in_a_loop(ready.parts))["cluster"] == "degraded"
 
 
 def test_it_is_looked_at_once_a_second(tmp_path, warm):
