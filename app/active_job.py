@@ -1,5 +1,6 @@
 """A job under way in this process, and which of several has its turn."""
 
+import time
 from collections import Counter, deque
 from collections.abc import Collection
 from dataclasses import dataclass, field
@@ -17,6 +18,7 @@ class ActiveJob:
     """A job that this process has claimed.
 
     gather_at : when its payload is to be gathered, s; infinite once that has begun
+    send_at : before when none of its units is sent, s
     payload : None until it is gathered
     slow : whether its units hold a worker for long
     waiting : units that are not sent;  running : those that are, each with what stands for the
@@ -29,6 +31,7 @@ class ActiveJob:
     job: Job
     kind: Kind
     gather_at: float = 0.0
+    send_at: float = 0.0
     payload: Any = None
     slow: bool = False
     waiting: deque[str] = field(default_factory=deque)
@@ -62,10 +65,14 @@ def chosen(jobs: Collection[ActiveJob], width: int) -> ActiveJob | None:
     running = [one for one in jobs for _ in one.running]
     if len(running) >= width:
         return None
-    busy = Counter(one.job.session for one in running)
+    busy, now = Counter(one.job.session for one in running), time.monotonic()
     slow = sum(one.slow for one in running) >= max(1, width - 1)
     return min(
-        (one for one in jobs if one.next is not None and not (slow and one.slow)),
+        (
+            one
+            for one in jobs
+            if one.next is not None and one.send_at <= now and not (slow and one.slow)
+        ),
         key=lambda one: (-one.job.priority, busy[one.job.session], one.job.created),
         default=None,
     )

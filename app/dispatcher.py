@@ -197,8 +197,9 @@ class Dispatcher:
             self._away_until = time.monotonic() + RETRY_AFTER
 
     def _send(self, active: ActiveJob) -> None:
-        """Send the next unit of a job; one that cannot be sent fails alone, unless it is the
-        database, the disk or the cluster that is away: then all wait.
+        """Send the next unit of a job; one that cannot be sent fails alone, and one whose parts
+        cannot be read just now waits alone, unless it is the database or the cluster that is away:
+        then all wait.
         """
         try:
             self._give(active)
@@ -218,7 +219,12 @@ class Dispatcher:
         assert unit is not None
         task, payload, kept = kind.task, active.payload, {}
         if unit == LAST:
-            kept = self._jobs.parts(active)
+            try:
+                kept = self._jobs.parts(active)
+            except Unavailable as away:
+                log.warning("job %s waits for its parts: %s", job.id, away)
+                active.send_at = time.monotonic() + RETRY_AFTER
+                return
         else:
             assert kind.division is not None
             task, payload = kind.division.unit, {**payload, "unit": unit}

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-USERS = (1_000, 100_000)
+USERS = (30, 1_000, 100_000)
 ACTIVE = 0.1
 """Share of the users who tune at the same time, at the busiest hour."""
 

@@ -2,6 +2,8 @@
 
 import errno
 from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path
 from threading import Event
 
 import pytest
@@ -61,6 +63,28 @@ def test_a_part_waits_for_what_there_is_too_little_of(team, monkeypatch, number)
     make(cluster, job, "a")
     until(lambda: job in cluster.tasks or team.store.jobs.get(team.ann, job).ended)
     assert cluster.kept.get(job) == {"a": b"a"}
+
+
+def test_a_job_whose_part_lies_on_a_bad_sector_waits_alone(team, monkeypatch):
+    """It goes on once the part can be read; jobs after it do not wait for that."""
+    cluster = team.dispatch()
+    bad, good = team.submit("sweep", team.ann, "a"), team.submit("sweep", team.ann, "b")
+    part, readable = team.store.directory.original(sha256(b"a").hexdigest()), Event()
+    read = Path.read_bytes
+
+    def sector(path):
+        if path == part and not readable.is_set():
+            raise OSError(errno.EIO, "injected")
+        return read(path)
+
+    monkeypatch.setattr(Path, "read_bytes", sector)
+    make(cluster, bad, "a")
+    make(cluster, good, "b")
+    until(lambda: good in cluster.tasks)
+    assert bad not in cluster.tasks
+    assert not team.store.jobs.get(team.ann, bad).ended
+    readable.set()
+    until(lambda: bad in cluster.tasks)
 
 
 def test_a_part_that_the_disk_lost_is_made_again(team):
