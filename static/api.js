@@ -80,10 +80,7 @@ async function frames(...args) {
 }
 
 // The service's tables
-/**
- * {state, message}; a 503 while compiling is an answer, not a failure. That jobs wait (`degraded`) keeps
- * the page from nothing else.
- */
+/** {state, message}; a 503 while compiling is an answer, not a failure. */
 export async function readiness() {
   let reply;
   try {
@@ -92,7 +89,6 @@ export async function readiness() {
     throw new Refusal({ title: "No connection", detail: "The service does not answer." });
   }
   const answer = await reply.json().catch(() => ({}));
-  if (answer.state === "degraded") return { ...answer, state: "ready" };
   return { state: answer.state ?? (reply.ok ? "ready" : "compiling"), ...answer };
 }
 export const parameters = () => json("GET", "/api/parameters");

@@ -4,7 +4,7 @@ import * as api from "./api.js";
 import * as form from "./campaign_form.js";
 import { take } from "./car.js";
 import { fold, h, inPlace } from "./dom.js";
-import { jobs } from "./job.js";
+import { jobs, queued } from "./job.js";
 import { deleted } from "./measurements.js";
 import { nameOf, ofAnotherPlant } from "./names.js";
 import { notice, refused } from "./notices.js";
@@ -148,7 +148,7 @@ function tools(running) {
 
 function progress() {
   const { runs, of, driven, duration, seconds, at_once: atOnce } = current().progress ?? {};
-  if (current().state === "queued" || of === undefined) return "Waiting for a worker …";
+  if (current().state === "queued" || of === undefined) return queued(current());
   const left = driven > 0 ? (seconds * (duration - driven)) / driven / Math.max(atOnce, 1) : 0;
   return `${runs} of ${of} drives, ${units.fixed(driven, 1)} of ${units.plain(duration, 4)} s` +
     form.taking(left, "left");

@@ -4,6 +4,11 @@ import * as api from "./api.js";
 import { refused } from "./notices.js";
 import { on, set } from "./store.js";
 
+const LOOK = 5000; // ms between two looks at why a job waits
+
+/** What is said of a job that waits: the service's reason, where workers are out of its reach. */
+export const queued = (job) => job.reason ?? "Waiting for a worker …";
+
 /**
  * Jobs of a kind ("identifications", "profiles", "validations", "campaigns"), called `what` to a person.
  * changed() is called when the job or its state has changed, progressed() when its progress has;
@@ -81,6 +86,17 @@ export function jobs(kind, what, { changed, progressed = changed, ended }) {
     }
   }
 
+  /** Find why it waits; that is known of the service, not of one job. */
+  async function explain() {
+    if (job?.state !== "queued") return;
+    const { state, message } = await api.readiness().catch(() => ({}));
+    const reason = state === "degraded" ? message : undefined;
+    if (job.state !== "queued" || job.reason === reason) return;
+    job.reason = reason;
+    changed();
+  }
+
+  setInterval(explain, LOOK);
   on("online", ({ online }) => { if (online && busy()) watch(); });
   return { now: () => job, busy, start, resume, cancel };
 }

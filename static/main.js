@@ -129,7 +129,7 @@ function settle() {
   settling ??= (async () => {
     for (;;) {
       const state = await api.readiness().catch(() => null);
-      if (state?.state === "ready") break;
+      if (["ready", "degraded"].includes(state?.state)) break; // jobs may wait, all else goes on
       set({ online: state !== null });
       banner(
         state

@@ -5,7 +5,7 @@ import * as api from "./api.js";
 import { h } from "./dom.js";
 import { symbolOf } from "./formula.js";
 import { span } from "./intervals.js";
-import { jobs } from "./job.js";
+import { jobs, queued } from "./job.js";
 import { refused } from "./notices.js";
 import { AXIS, COLOURS, fitWidth } from "./plots.js";
 import * as units from "./units.js";
@@ -103,7 +103,7 @@ function waiting(fitted, name) {
     return h("div", { className: "row-tools" },
       h("button", { type: "button", className: "danger", id: "cancel-profile", on: { click: cancel } }, "Cancel profile"),
       h("progress", { max: POINTS, value: points, "aria-label": "Points fitted" }),
-      h("span", { className: "hint", role: "status" }, job.state === "queued" ? "Waiting for a worker …"
+      h("span", { className: "hint", role: "status" }, job.state === "queued" ? queued(job)
         : `${units.parameter(job.parameter).label}: ${points} points fitted; each is a fit of all other parameters.`));
   }
   const again = name ? h("button", { type: "button", on: { click: () => ask(fitted, name) } }, "Try again") : null;

@@ -6,6 +6,7 @@ import { costChart } from "./cost.js";
 import { DETERMINED, mark, WORDS } from "./determined.js";
 import { $, breakable, capital, counted, fileName, h, saveFile, symbol } from "./dom.js";
 import { span } from "./intervals.js";
+import { queued } from "./job.js";
 import { distinct, nameOf } from "./names.js";
 import * as sensors from "./sensors_form.js";
 import { get } from "./store.js";
@@ -14,7 +15,6 @@ import { combinations, summary } from "./verdict.js";
 import { worded } from "./wording.js";
 
 const STATES = {
-  queued: "Waiting for a worker …",
   done: "Done",
   failed: "Failed",
   cancelled: "Cancelled",
@@ -71,6 +71,7 @@ function running(job) {
 
 function outcome(job) {
   if (job.state === "running") return `Fitting ${job.runs.map(({ id, name }) => nameOf(id) ?? name).join(", ")} …`;
+  if (job.state === "queued") return queued(job);
   if (!job.result) return STATES[job.state];
   return job.result.outcome;
 }

@@ -2,7 +2,7 @@
 
 import * as api from "./api.js";
 import { $, h, inPlace } from "./dom.js";
-import { jobs } from "./job.js";
+import { jobs, queued } from "./job.js";
 import { nameOf, ofAnotherCar } from "./names.js";
 import { refused } from "./notices.js";
 import * as pivots from "./pivots.js";
@@ -114,7 +114,8 @@ function state() {
   const job = current();
   if (!job) return "A report for print comes with it.";
   if (job.state === "running") return `${job.progress?.predictions ?? 0} of ${job.progress?.of ?? "…"} predictions`;
-  return { queued: "Waiting for a worker …", cancelled: "Cancelled", failed: "Failed", done: "" }[job.state];
+  if (job.state === "queued") return queued(job);
+  return { cancelled: "Cancelled", failed: "Failed", done: "" }[job.state];
 }
 
 function runRow(run, role) {

@@ -217,6 +217,21 @@ def test_a_campaign_is_followed_on_after_the_service_has_been_away(visit, tmp_pa
         service.stop()
 
 
+@pytest.mark.slow
+def test_a_job_that_waits_for_workers_out_of_reach_says_so(visit, tmp_path):
+    """Nothing listens at port 9; the page is there all the same."""
+    service = Service(tmp_path / "data", RIDETUNE_CLUSTER="tcp://127.0.0.1:9")
+    try:
+        visitor = visit().open(service.address)
+        visitor.click("#tab-identification")
+        visitor.click("#identify")
+        outcome = visitor.element("#outcome")
+        visitor.wait(lambda: "workers cannot be reached" in outcome.inner_text(), "a reason")
+        assert visitor.look("ridetune.state('online')")
+    finally:
+        service.stop()
+
+
 def test_a_car_that_cannot_drive_here_is_shown_with_the_reason(visit, service):
     """As the service's list has it where the solver is not installed."""
     visitor = visit()
