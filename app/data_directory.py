@@ -40,7 +40,8 @@ class DataDirectory:
     def __init__(self, path: Path, database: str | None = None):
         self.path = path
         self._lock: int | None = None
-        try:
+        with usable(path):
+            check_owner(path, database)
             make_private(path)
             self.originals = path / "originals"
             self.originals.mkdir(exist_ok=True)
@@ -51,30 +52,16 @@ class DataDirectory:
                 self._join(database)
                 return
             self._lock = os.open(path / "owner.lock", os.O_RDWR | os.O_CREAT, 0o600)
-        except OSError as error:
-            raise StartError(
-                f"The data directory {path} cannot be used ({error.strerror}); "
-                "choose another with --data."
-            ) from None
         self._own(self._lock)
 
     def _join(self, database: str) -> None:
-        """Refuse a folder of another database, in which everything would look left over."""
-        if self.database.exists():
-            raise StartError(
-                f"The data directory {self.path} holds an SQLite database; take it over with "
-                "ridetune backup and restore, and choose another directory with --data."
-            )
+        """Claim the folder, unless another database was first."""
         if not self._mark.exists():
             beside = self._mark.with_suffix(f".{secrets.token_hex(4)}.tmp")
             _write(beside, f"{database}\n".encode())
             os.replace(beside, self._mark)
             flush(self.path)
-        if self._mark.read_text().strip() != database:
-            raise StartError(
-                f"The data directory {self.path} belongs to another PostgreSQL database; choose "
-                "another one with --data, or name its own in RIDETUNE_DATABASE."
-            )
+        check_owner(self.path, database)
 
     def _own(self, lock: int) -> None:
         try:
@@ -86,12 +73,6 @@ class DataDirectory:
                 f"The data directory {self.path} is in use by another ridetune (process {owner}); "
                 "stop that one or choose another directory with --data."
             ) from None
-        if self._mark.exists():
-            os.close(lock)
-            raise StartError(
-                f"The data directory {self.path} belongs to a PostgreSQL database; name it in "
-                "RIDETUNE_DATABASE, or choose another directory with --data."
-            )
         os.ftruncate(lock, 0)
         os.pwrite(lock, f"{os.getpid()}\n".encode(), 0)
 
@@ -163,6 +144,41 @@ class DataDirectory:
             os.close(self._lock)
 
 
+@contextlib.contextmanager
+def usable(path: Path) -> Iterator[None]:
+    """Where a data directory cannot be had, that is a sentence."""
+    try:
+        yield
+    except OSError as error:
+        raise StartError(
+            f"The data directory {path} cannot be used ({error.strerror}); "
+            "choose another with --data."
+        ) from None
+
+
+def check_owner(path: Path, database: str | None) -> None:
+    """Refuse a folder of another database than the PostgreSQL one of this id, or, None, its own
+    SQLite one: everything in it would look left over.
+    """
+    mark = path / MARK
+    owner = mark.read_text().strip() if mark.exists() else None
+    if owner is None and database is not None and database_of(path).exists():
+        raise StartError(
+            f"The data directory {path} holds an SQLite database; take it over with ridetune "
+            "backup and restore, and choose another directory with --data."
+        )
+    if owner is not None and database is None:
+        raise StartError(
+            f"The data directory {path} belongs to a PostgreSQL database; name it in "
+            "RIDETUNE_DATABASE, or choose another directory with --data."
+        )
+    if owner is not None and owner != database:
+        raise StartError(
+            f"The data directory {path} belongs to another PostgreSQL database; choose another "
+            "one with --data, or name its own in RIDETUNE_DATABASE."
+        )
+
+
 def place_of_original(data: Path, sha256: str) -> Path:
     """Place of an original in a data directory."""
     return data / "originals" / sha256[:2] / sha256
@@ -178,6 +194,11 @@ def _write(place: Path, data: bytes) -> None:
 def database_of(path: Path) -> Path:
     """Place of the database in a data directory."""
     return path / DATABASE
+
+
+def is_used(path: Path) -> bool:
+    """Whether a data directory is some database's."""
+    return database_of(path).exists() or (path / MARK).exists()
 
 
 def make_private(path: Path) -> None:

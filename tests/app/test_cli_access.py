@@ -10,7 +10,9 @@ import time
 import httpx2
 import pytest
 from ridetune.app.cli import main
+from ridetune.app.limits import Limits
 from ridetune.app.recent_answers import SECONDS
+from ridetune.app.store import Store
 
 from .command_line import PROGRAM, refused
 
@@ -158,3 +160,39 @@ def test_a_wrong_command_is_refused_in_one_line(folder, capsys, monkeypatch, com
 def test_other_users_do_not_look_into_a_new_data_directory(folder):
     assert main(["keys", "add", "rig", "--data", "data"]) == 0
     assert (folder / "data").stat().st_mode & 0o777 == 0o700
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["keys add rig", "keys list", "link", "browsers list", "backup -o backup.zip"],
+)
+def test_a_directory_of_postgresql_is_refused_without_its_database(
+    folder, capsys, monkeypatch, on_postgresql, command
+):
+    """As the service refuses it; a key would go where no service looks. Oracle: the folder."""
+    monkeypatch.delenv("RIDETUNE_DATABASE", raising=False)
+    Store(folder / "data", Limits(), on_postgresql).close()
+    before = set(folder.rglob("*"))
+    told = refused(capsys, *command.split(), "--data", "data")
+    assert "data belongs to a PostgreSQL database; name it in RIDETUNE_DATABASE" in told
+    assert told == refused(capsys, "serve", "--port", "0", "--data", "data")
+    assert set(folder.rglob("*")) == before
+
+
+@pytest.mark.parametrize("command", ["keys list", "backup -o backup.zip"])
+def test_a_directory_of_another_database_is_refused(
+    folder, capsys, monkeypatch, on_postgresql, postgresql, command
+):
+    Store(folder / "data", Limits(), on_postgresql).close()
+    with postgresql.database() as another:
+        Store(folder / "other", Limits(), another).close()
+        monkeypatch.setenv("RIDETUNE_DATABASE", another)
+        told = refused(capsys, *command.split(), "--data", "data")
+    assert "data belongs to another PostgreSQL database" in told
+
+
+def test_a_database_that_lies_beside_the_mark_keeps_no_service_away(tmp_path, on_postgresql):
+    """It is not the directory's: with the mark no service uses SQLite there."""
+    Store(tmp_path, Limits(), on_postgresql).close()
+    (tmp_path / "ridetune.sqlite").touch()
+    Store(tmp_path, Limits(), on_postgresql).close()
