@@ -24,7 +24,7 @@ def last_address(settings: Settings) -> str:
     except FileNotFoundError:
         raise StartError(
             f"No service has run with the data directory {settings.data} yet; start one with "
-            "`ridetune serve`."
+            "`ridetune serve`, or name another with --data."
         ) from None
 
 

@@ -27,3 +27,9 @@ def kept(settings: Settings, *, new: bool = False) -> Iterator[Database]:
         yield database
     finally:
         database.close()
+
+
+def place(settings: Settings) -> str:
+    """Where a command looks, as a person is told."""
+    shared = "the database of RIDETUNE_DATABASE"
+    return shared if settings.database else f"the data directory {settings.data.absolute()}"

@@ -132,6 +132,10 @@ def test_nobody_forwards_themselves_into_the_proxys_place(tmp_path):
     ("command", "told"),
     [
         ("link --data none", "No service has used the data directory none"),
+        (
+            "link --data data",
+            "data yet; start one with `ridetune serve`, or name another with --data",
+        ),
         ("keys list --data none", "No service has used the data directory none"),
         ("keys", "add|list|remove"),
         ("keys ad rig", "did you mean add?"),
@@ -155,6 +159,25 @@ def test_a_wrong_command_is_refused_in_one_line(folder, capsys, monkeypatch, com
     capsys.readouterr()
     assert told.lower() in refused(capsys, *command.split()).lower()
     assert not (folder / "none").exists()
+
+
+def test_the_place_in_which_is_looked_is_told(folder, capsys, monkeypatch):
+    """A root's key beside a service of /var/lib is of no use, and would not be noticed."""
+    monkeypatch.delenv("RIDETUNE_DATABASE", raising=False)
+    monkeypatch.setenv("RIDETUNE_DATA", str(folder / "data"))
+    assert main(["keys", "add", "rig"]) == 0
+    printed = capsys.readouterr()
+    assert re.fullmatch(r"rt_[\w-]{43}\n", printed.out)
+    assert f"kept in the data directory {folder}/data," in printed.err
+    assert main(["keys", "remove", "rig"]) == 0
+    for command in (("keys", "list"), ("browsers", "list")):
+        assert f"in the data directory {folder}/data; " in run(capsys, *command)
+
+
+def test_a_key_of_a_shared_database_is_said_to_be_there(capsys, monkeypatch, on_postgresql):
+    monkeypatch.setenv("RIDETUNE_DATABASE", on_postgresql)
+    assert main(["keys", "add", "rig"]) == 0
+    assert "kept in the database of RIDETUNE_DATABASE," in capsys.readouterr().err
 
 
 def test_other_users_do_not_look_into_a_new_data_directory(folder):
