@@ -25,9 +25,10 @@ from zipfile import ZIP_DEFLATED, ZipFile
 
 from sqlalchemy import Connection, delete, func, insert, select
 
-from .data_directory import DATABASE, check_owner, place_of_original, usable
+from .data_directory import DATABASE, check_owner, usable
 from .database import Database
 from .errors import BackupError
+from .originals import place_of_original
 from .postgresql import PostgresqlDatabase
 from .settings import Settings
 from .sqlite import SqliteDatabase

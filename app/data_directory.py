@@ -8,9 +8,7 @@
     reading/            uploads that a child reads, and the folders that children work in
     dask/               scratch space of the job workers
 
-An original is written beside its place, flushed, renamed and the folder flushed, so that after a
-power cut it is there whole or not at all. The kernel drops the lock with the process, however it
-ended.
+The kernel drops the lock with the process, however it ended.
 """
 
 import contextlib
@@ -25,12 +23,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from .errors import StartError
+from .originals import Originals, flush, write
 
 DATABASE = "ridetune.sqlite"
 MARK = "postgresql.id"
 
 
-class DataDirectory:
+class DataDirectory(Originals):
     """The folder, once it is clear whose it is; `close` gives it up.
 
     database : id of the PostgreSQL database whose services share the folder; None where one
@@ -38,12 +37,11 @@ class DataDirectory:
     """
 
     def __init__(self, path: Path, database: str | None = None):
-        self.path = path
+        super().__init__(path)
         self._lock: int | None = None
         with usable(path):
             check_owner(path, database)
             make_private(path)
-            self.originals = path / "originals"
             self.originals.mkdir(exist_ok=True)
             self.reading.mkdir(exist_ok=True)
             if not os.access(self.originals, os.W_OK):
@@ -58,7 +56,7 @@ class DataDirectory:
         """Claim the folder, unless another database was first."""
         if not self._mark.exists():
             beside = self._mark.with_suffix(f".{secrets.token_hex(4)}.tmp")
-            _write(beside, f"{database}\n".encode())
+            write(beside, f"{database}\n".encode())
             os.replace(beside, self._mark)
             flush(self.path)
         check_owner(self.path, database)
@@ -94,38 +92,6 @@ class DataDirectory:
     def reading(self) -> Path:
         """Place for what is needed while a file is read."""
         return self.path / "reading"
-
-    def original(self, sha256: str) -> Path:
-        """Place of an original."""
-        return place_of_original(self.path, sha256)
-
-    def lacks(self, sha256: str) -> bool:
-        """Whether an original is not there, although others are; OSError where nobody can tell."""
-        return not self.original(sha256).exists() and any(self.originals.iterdir())
-
-    def keep(self, sha256: str, data: bytes) -> None:
-        """Write an original so that it survives a power cut, unless it is there."""
-        place = self.original(sha256)
-        if place.exists():
-            return
-        place.parent.mkdir(exist_ok=True)
-        beside = place.with_suffix(f".{secrets.token_hex(4)}.tmp")
-        try:
-            _write(beside, data)
-            os.replace(beside, place)
-        except OSError:
-            beside.unlink(missing_ok=True)
-            raise
-        for folder in (place.parent, self.originals):
-            flush(folder)
-
-    def names(self) -> Iterator[str]:
-        """The originals by their SHA-256, and what was written of some."""
-        return (file.name for file in self.originals.glob("*/*"))
-
-    def drop(self, name: str) -> None:
-        """Remove one of them."""
-        self.original(name).unlink(missing_ok=True)
 
     def sweep(self, older: float = -math.inf) -> None:
         """Remove what was being read when a service crashed: what is so old, s."""
@@ -179,18 +145,6 @@ def check_owner(path: Path, database: str | None) -> None:
         )
 
 
-def place_of_original(data: Path, sha256: str) -> Path:
-    """Place of an original in a data directory."""
-    return data / "originals" / sha256[:2] / sha256
-
-
-def _write(place: Path, data: bytes) -> None:
-    with open(place, "wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-
-
 def database_of(path: Path) -> Path:
     """Place of the database in a data directory."""
     return path / DATABASE
@@ -204,12 +158,3 @@ def is_used(path: Path) -> bool:
 def make_private(path: Path) -> None:
     """Make a data directory; other users of the machine do not look into a new one."""
     path.mkdir(mode=0o700, parents=True, exist_ok=True)
-
-
-def flush(place: Path) -> None:
-    """Wait until a file or a folder is on the disk."""
-    descriptor = os.open(place, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

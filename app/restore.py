@@ -21,9 +21,10 @@ from zipfile import BadZipFile, ZipFile
 from sqlalchemy import select
 
 from .backup import CHUNK, FORMAT, KIND, MANIFEST, ORIGINALS, Kept, copy_rows, counted
-from .data_directory import DATABASE, MARK, DataDirectory, flush
+from .data_directory import DATABASE, MARK, DataDirectory
 from .database import Database
 from .errors import BackupError
+from .originals import flush
 from .postgresql import PostgresqlDatabase
 from .settings import Settings
 from .sqlite import SqliteDatabase
