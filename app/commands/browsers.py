@@ -18,7 +18,7 @@ def browsers(options: Namespace) -> None:
             store.remove(options.ids)
             print(
                 f"Ended: {', '.join(options.ids)}. A session that such a browser has begun stays "
-                "open to it until the session is deleted."
+                "open to it until `ridetune sessions remove` deletes it, or somebody in it."
             )
         elif known := store.list():
             _print(known)

@@ -11,11 +11,14 @@ from ..store import database_beside
 
 
 @contextmanager
-def kept(settings: Settings, *, new: bool = False) -> Iterator[Database]:
-    """The database of a data directory that a service has used, or, `new`, will use."""
+def kept(settings: Settings, *, new: bool = False, files: bool = False) -> Iterator[Database]:
+    """The database of a data directory that a service has used, or, `new`, will use.
+
+    files : whether the directory itself is needed, too, where the rows are in PostgreSQL
+    """
     data = settings.data
     with usable(data):
-        if not settings.database and not is_used(data):
+        if (files or not settings.database) and not is_used(data):
             if not new:
                 raise StartError(
                     f"No service has used the data directory {data} yet; start one with `ridetune "
