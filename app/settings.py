@@ -5,6 +5,7 @@ Every setting has an environment variable, and what is named like one but is non
 
 import math
 import os
+import shlex
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -151,8 +152,9 @@ class Settings:
         if not (self.token or self.proxy_user_header or keys):
             raise StartError(
                 f"Listening on {self.host} would open the service to other machines; set "
-                "RIDETUNE_TOKEN to a secret that visitors must bring, make a key with `ridetune "
-                "keys add`, set up the login of a proxy, or use --host 127.0.0.1."
+                "RIDETUNE_TOKEN to a secret that visitors must bring, make a key with "
+                f"`{shlex.join(['ridetune', 'keys', 'add', 'NAME', '--data', str(self.data)])}`, "
+                "set up the login of a proxy, or use --host 127.0.0.1."
             )
 
     @property

@@ -12,9 +12,11 @@ import pytest
 from ridetune.app.cli import main
 from ridetune.app.limits import Limits
 from ridetune.app.recent_answers import SECONDS
+from ridetune.app.settings import Settings
 from ridetune.app.store import Store
 
 from .command_line import PROGRAM, refused
+from .conftest import open_client
 
 PATIENCE = 60.0
 LINK = r"Open (http://127\.0\.0\.1:\d+)/(\?token=[\w-]{43})\n"
@@ -111,6 +113,23 @@ def test_a_service_with_another_token_shows_no_browser_of_the_former_one(tmp_pat
             process.communicate(timeout=60)
 
 
+def test_behind_a_proxy_the_terminal_names_the_directory_and_the_page_does_not(tmp_path, capsys):
+    """The command that the terminal shows works; visitors are told no paths."""
+    with serve(tmp_path, RIDETUNE_PUBLIC_URL="https://ride.example") as process:
+        first, second = process.stdout.readline(), process.stdout.readline()
+        assert re.match(r"Open https://ride\.example/\?token=", first)
+        command = second.rpartition("for another: ")[2].split()
+        assert command == ["ridetune", "link", "--data", str(tmp_path)]
+        assert "https://ride.example/?token=" in run(capsys, *command[1:])
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=60)
+    settings = Settings(data=tmp_path, public_url="https://ride.example")
+    with open_client(settings, login=True) as visitor:
+        page = visitor.get("/").text
+    assert "ridetune link" in page
+    assert str(tmp_path) not in page
+
+
 def test_nobody_forwards_themselves_into_the_proxys_place(tmp_path):
     """The address that counts is that of the connection, whatever is said of others."""
     proxy = {
@@ -147,7 +166,7 @@ def test_nobody_forwards_themselves_into_the_proxys_place(tmp_path):
         ("keys remove rig --data data", "there is no key 'rig'"),
         ("keys add rig --data data/file", "cannot be used"),
         ("serve --host 0.0.0.0 --no-login --port 0 --data data", "without login"),
-        ("serve --host 0.0.0.0 --port 0 --data data", "ridetune keys add"),
+        ("serve --host 0.0.0.0 --port 0 --data data", "`ridetune keys add NAME --data data`"),
     ],
 )
 def test_a_wrong_command_is_refused_in_one_line(folder, capsys, monkeypatch, command, told):
