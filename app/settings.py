@@ -44,6 +44,10 @@ NAMES = (
 VARIABLES = (*(OURS + name for name in NAMES), *LIMITS)
 """All there are."""
 
+TOKEN_LENGTH = 16
+"""The least, which nobody guesses if it is random."""
+MAKES_TOKEN = 'python3 -c "import secrets; print(secrets.token_hex(24))"'
+
 Choice = TypeVar("Choice", bound=str)
 
 
@@ -194,11 +198,18 @@ def _host_names(text: str) -> tuple[str, ...]:
 
 
 def _token(text: str) -> str:
-    """A secret that comes unchanged out of an address, where + is a space."""
+    """A secret that nobody guesses, and that comes unchanged out of an address, where + is a
+    space.
+    """
     if text and quote(text, safe="") != text:
         raise StartError(
             "RIDETUNE_TOKEN has characters that an address changes; make one of letters and "
-            "digits, as `openssl rand -hex 24` does."
+            f"digits, as `{MAKES_TOKEN}` does."
+        )
+    if 0 < len(text) < TOKEN_LENGTH:
+        raise StartError(
+            f"RIDETUNE_TOKEN has fewer than {TOKEN_LENGTH} characters and could be guessed; make "
+            f"one with `{MAKES_TOKEN}`."
         )
     return text
 

@@ -103,11 +103,14 @@ def test_a_browser_is_ended_beside_the_running_service(service, capsys):
 
 
 def test_a_service_with_another_token_shows_no_browser_of_the_former_one(tmp_path, capsys):
-    for token, shown in (("sesame", "the token"), ("another", "No browser is let in")):
+    for token, shown in (
+        ("open-sesame-open", "the token"),
+        ("another-one-by-now", "No browser is let in"),
+    ):
         with serve(tmp_path, RIDETUNE_TOKEN=token) as process:
             address = re.search(r"http://[\d.:]+", process.stdout.readline())[0]
-            known = httpx2.get(f"{address}/?token=sesame", timeout=PATIENCE).status_code
-            assert known == (303 if token == "sesame" else 403)
+            known = httpx2.get(f"{address}/?token=open-sesame-open", timeout=PATIENCE).status_code
+            assert known == (303 if token == "open-sesame-open" else 403)
             assert shown in run(capsys, "browsers", "list", "--data", str(tmp_path))
             process.send_signal(signal.SIGINT)
             process.communicate(timeout=60)
