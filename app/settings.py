@@ -44,6 +44,8 @@ NAMES = (
 VARIABLES = (*(OURS + name for name in NAMES), *LIMITS)
 """All there are."""
 
+EVERY_ADDRESS = ("0.0.0.0", "::")
+"""To listen there; nobody's name for the service."""
 TOKEN_LENGTH = 16
 """The least, which nobody guesses if it is random."""
 MAKES_TOKEN = 'python3 -c "import secrets; print(secrets.token_hex(24))"'
@@ -168,7 +170,7 @@ class Settings:
 
     def host_names(self) -> frozenset[str]:
         """Names a request's Host header may carry, lower case and without port."""
-        own = () if self.host in ("0.0.0.0", "::") else (in_brackets(self.host),)
+        own = () if self.host in EVERY_ADDRESS else (in_brackets(self.host),)
         public = (without_port(urlsplit(self.public_url).netloc),) if self.public_url else ()
         names = ("localhost", "127.0.0.1", "[::1]", *own, *public, *self.allowed_hosts)
         return frozenset(name.lower() for name in names)

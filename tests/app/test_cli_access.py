@@ -22,10 +22,21 @@ PATIENCE = 60.0
 LINK = r"Open (http://127\.0\.0\.1:\d+)/(\?token=[\w-]{43})\n"
 
 
-def serve(folder, **environment):
+def serve(folder, *options, **environment):
     """`ridetune serve` with data in a folder, on a free port."""
     told = {name: text for name, text in os.environ.items() if "RIDETUNE" not in name}
-    command = [sys.executable, "-u", "-c", PROGRAM, "serve", "--port", "0", "--data", folder]
+    command = [
+        sys.executable,
+        "-u",
+        "-c",
+        PROGRAM,
+        "serve",
+        "--port",
+        "0",
+        "--data",
+        folder,
+        *options,
+    ]
     return subprocess.Popen(
         command,
         stdout=subprocess.PIPE,
@@ -131,6 +142,21 @@ def test_behind_a_proxy_the_terminal_names_the_directory_and_the_page_does_not(t
         page = visitor.get("/").text
     assert "ridetune link" in page
     assert str(tmp_path) not in page
+
+
+def test_the_names_by_which_others_come_are_told_at_the_start(tmp_path):
+    """Oracle: what requests are answered by these names, and by another."""
+    told = {"RIDETUNE_TOKEN": "open-sesame-open", "RIDETUNE_ALLOWED_HOSTS": "ride.example"}
+    with serve(tmp_path, "--host", "0.0.0.0", **told) as process:
+        address, sentence = process.stdout.readline(), process.stdout.readline()
+        address = re.search(r"http://[\d.:]+", address)[0]
+        names = re.match("It answers to the names (.*) alone; RIDETUNE_ALLOWED_HOSTS", sentence)[1]
+        assert names.split(", ") == ["127.0.0.1", "[::1]", "localhost", "ride.example"]
+        for name in (*names.split(", "), "192.0.2.1"):
+            reply = httpx2.get(f"{address}/healthz", headers={"Host": name}, timeout=PATIENCE)
+            assert reply.status_code == (403 if name == "192.0.2.1" else 200)
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=60)
 
 
 def test_nobody_forwards_themselves_into_the_proxys_place(tmp_path):
