@@ -19,6 +19,7 @@ from typing import Any
 from zipfile import BadZipFile, ZipFile
 
 from sqlalchemy import select
+from sqlalchemy.exc import IntegrityError
 
 from .backup import CHUNK, FORMAT, KIND, MANIFEST, ORIGINALS, Kept, copy_rows, counted
 from .data_directory import DATABASE, MARK, DataDirectory, usable
@@ -32,6 +33,7 @@ from .tables import SCHEMA_VERSION, uploads
 
 NAME = re.compile(rf"{ORIGINALS}/([0-9a-f]{{2}})/(\1[0-9a-f]{{62}})|{re.escape(DATABASE)}")
 LONGEST_MANIFEST = 200_000_000
+IN_USE = "The database of RIDETUNE_DATABASE is not empty; a backup is restored into a fresh one."
 UNREADABLE = (
     *(BadZipFile, EOFError, NotImplementedError, OSError, RuntimeError, ValueError),
     *(struct.error, zlib.error),
@@ -76,15 +78,15 @@ def _to_postgresql(
 ) -> None:
     with closing(PostgresqlDatabase(settings.database)) as database:
         if any(vars(counted(database)).values()):
-            raise BackupError(
-                "The database of RIDETUNE_DATABASE is not empty; a backup is restored into a fresh "
-                "one."
-            )
+            raise BackupError(IN_USE)
         directory = DataDirectory(settings.data, database.id)
         with _all_or_none(directory) as put:
             put(archive, files)
-            with rows.reading() as source, database.writing() as target:
-                copy_rows(source, target)
+            try:
+                with rows.reading() as source, database.writing() as target:
+                    copy_rows(source, target)
+            except IntegrityError:  # by a key, or by whoever was let in
+                raise BackupError(IN_USE) from None
 
 
 def _require_empty(settings: Settings) -> None:

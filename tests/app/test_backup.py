@@ -351,6 +351,24 @@ def test_a_restore_into_a_database_in_use_claims_no_directory(
         command(empty, "restore", backup, "--data", there)
 
 
+def test_a_restore_over_a_key_of_the_same_name_is_refused(
+    tmp_path, command, capsys, monkeypatch, on_postgresql
+):
+    """Of which only one could be kept; nothing is restored."""
+    here, there, file = tmp_path / "here", tmp_path / "there", tmp_path / "backup.zip"
+    store = Store(here, Limits())
+    filled(store)
+    store.keys.add("rig")
+    store.close()
+    command("", "backup", "--data", here, "-o", file)
+    command(on_postgresql, "keys", "add", "rig")
+    capsys.readouterr()
+    assert "is not empty" in refused(capsys, "restore", str(file), "--data", str(there))
+    assert not there.exists()
+    command(on_postgresql, "keys", "remove", "rig")
+    command(on_postgresql, "restore", file, "--data", there)
+
+
 def test_a_restore_that_fails_half_way_leaves_nothing(
     tmp_path, backup, capsys, monkeypatch, database
 ):
