@@ -25,9 +25,10 @@ from zipfile import ZIP_DEFLATED, ZipFile
 
 from sqlalchemy import Connection, delete, func, insert, select
 
-from .data_directory import DATABASE, MARK, place_of_original
+from .data_directory import DATABASE, check_owner, usable
 from .database import Database
 from .errors import BackupError
+from .originals import place_of_original
 from .postgresql import PostgresqlDatabase
 from .settings import Settings
 from .sqlite import SqliteDatabase
@@ -130,6 +131,8 @@ def _copied(settings: Settings, copy: Path) -> Iterator[Callable[[str], bool]]:
     """Copy the rows of one moment; gives whether an original has its row in the source still."""
     if settings.database:
         with closing(PostgresqlDatabase(settings.database, made=True)) as database:
+            with usable(settings.data):
+                check_owner(settings.data, database.id)
             with (
                 closing(SqliteDatabase(copy)) as rows,
                 database.reading() as source,
@@ -145,10 +148,11 @@ def _copied(settings: Settings, copy: Path) -> Iterator[Callable[[str], bool]]:
             yield still_kept
         return
     place = settings.data / DATABASE
-    if not place.is_file():
-        of_postgresql = (settings.data / MARK).exists()
-        remedy = "name the database in RIDETUNE_DATABASE" if of_postgresql else "see --data"
-        raise BackupError(f"There is no {DATABASE} in the directory {settings.data}; {remedy}.")
+    with usable(settings.data):
+        check_owner(settings.data, None)
+        there = place.is_file()
+    if not there:
+        raise BackupError(f"There is no {DATABASE} in the directory {settings.data}; see --data.")
     try:
         with closing(sqlite3.connect(place, timeout=10.0)) as source:
             with closing(sqlite3.connect(copy)) as target:

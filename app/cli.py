@@ -84,6 +84,7 @@ def command_line() -> Parser:
     takes.serve(add("serve", _serve, "Serve the page and the REST interface."))
     takes.link(add("link", _link, "Make a link that lets one more browser in."))
     takes.browsers(add("browsers", _browsers, "Show and end the browsers that are let in."))
+    takes.sessions(add("sessions", _sessions, "Show and delete the sessions that are kept."))
     takes.keys(add("keys", _keys, "Make, show and end the API keys of programs."))
     takes.simulate(add("simulate", _simulate, "Simulate a car on a road, from rims or posts."))
     takes.channels(add("channels", _channels, "Show which channels a recording's columns are."))
@@ -135,6 +136,12 @@ def _browsers(options: argparse.Namespace) -> None:
     from .commands.browsers import browsers
 
     browsers(options)
+
+
+def _sessions(options: argparse.Namespace) -> None:
+    from .commands.sessions import sessions
+
+    sessions(options)
 
 
 def _keys(options: argparse.Namespace) -> None:

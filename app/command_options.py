@@ -41,6 +41,16 @@ def browsers(command: Parser) -> None:
         _add_data(action)
 
 
+def sessions(command: Parser) -> None:
+    actions = command.add_subparsers(metavar="list|remove", dest="action", required=True)
+    command.commands = actions.choices
+    shown = actions.add_parser("list", help="show whose each session is, and what it holds")
+    remove = actions.add_parser("remove", help="delete sessions with all they hold")
+    remove.add_argument("ids", metavar="ID", nargs="+", help="as the list shows it")
+    for action in (shown, remove):
+        _add_data(action)
+
+
 def keys(command: Parser) -> None:
     actions = command.add_subparsers(metavar="add|list|remove", dest="action", required=True)
     command.commands = actions.choices

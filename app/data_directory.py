@@ -8,9 +8,7 @@
     reading/            uploads that a child reads, and the folders that children work in
     dask/               scratch space of the job workers
 
-An original is written beside its place, flushed, renamed and the folder flushed, so that after a
-power cut it is there whole or not at all. The kernel drops the lock with the process, however it
-ended.
+The kernel drops the lock with the process, however it ended.
 """
 
 import contextlib
@@ -25,12 +23,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from .errors import StartError
+from .originals import Originals, flush, write
 
 DATABASE = "ridetune.sqlite"
 MARK = "postgresql.id"
 
 
-class DataDirectory:
+class DataDirectory(Originals):
     """The folder, once it is clear whose it is; `close` gives it up.
 
     database : id of the PostgreSQL database whose services share the folder; None where one
@@ -38,11 +37,11 @@ class DataDirectory:
     """
 
     def __init__(self, path: Path, database: str | None = None):
-        self.path = path
+        super().__init__(path)
         self._lock: int | None = None
-        try:
+        with usable(path):
+            check_owner(path, database)
             make_private(path)
-            self.originals = path / "originals"
             self.originals.mkdir(exist_ok=True)
             self.reading.mkdir(exist_ok=True)
             if not os.access(self.originals, os.W_OK):
@@ -51,30 +50,16 @@ class DataDirectory:
                 self._join(database)
                 return
             self._lock = os.open(path / "owner.lock", os.O_RDWR | os.O_CREAT, 0o600)
-        except OSError as error:
-            raise StartError(
-                f"The data directory {path} cannot be used ({error.strerror}); "
-                "choose another with --data."
-            ) from None
         self._own(self._lock)
 
     def _join(self, database: str) -> None:
-        """Refuse a folder of another database, in which everything would look left over."""
-        if self.database.exists():
-            raise StartError(
-                f"The data directory {self.path} holds an SQLite database; take it over with "
-                "ridetune backup and restore, and choose another directory with --data."
-            )
+        """Claim the folder, unless another database was first."""
         if not self._mark.exists():
             beside = self._mark.with_suffix(f".{secrets.token_hex(4)}.tmp")
-            _write(beside, f"{database}\n".encode())
+            write(beside, f"{database}\n".encode())
             os.replace(beside, self._mark)
             flush(self.path)
-        if self._mark.read_text().strip() != database:
-            raise StartError(
-                f"The data directory {self.path} belongs to another PostgreSQL database; choose "
-                "another one with --data, or name its own in RIDETUNE_DATABASE."
-            )
+        check_owner(self.path, database)
 
     def _own(self, lock: int) -> None:
         try:
@@ -86,12 +71,6 @@ class DataDirectory:
                 f"The data directory {self.path} is in use by another ridetune (process {owner}); "
                 "stop that one or choose another directory with --data."
             ) from None
-        if self._mark.exists():
-            os.close(lock)
-            raise StartError(
-                f"The data directory {self.path} belongs to a PostgreSQL database; name it in "
-                "RIDETUNE_DATABASE, or choose another directory with --data."
-            )
         os.ftruncate(lock, 0)
         os.pwrite(lock, f"{os.getpid()}\n".encode(), 0)
 
@@ -114,38 +93,6 @@ class DataDirectory:
         """Place for what is needed while a file is read."""
         return self.path / "reading"
 
-    def original(self, sha256: str) -> Path:
-        """Place of an original."""
-        return place_of_original(self.path, sha256)
-
-    def lacks(self, sha256: str) -> bool:
-        """Whether an original is not there, although others are; OSError where nobody can tell."""
-        return not self.original(sha256).exists() and any(self.originals.iterdir())
-
-    def keep(self, sha256: str, data: bytes) -> None:
-        """Write an original so that it survives a power cut, unless it is there."""
-        place = self.original(sha256)
-        if place.exists():
-            return
-        place.parent.mkdir(exist_ok=True)
-        beside = place.with_suffix(f".{secrets.token_hex(4)}.tmp")
-        try:
-            _write(beside, data)
-            os.replace(beside, place)
-        except OSError:
-            beside.unlink(missing_ok=True)
-            raise
-        for folder in (place.parent, self.originals):
-            flush(folder)
-
-    def names(self) -> Iterator[str]:
-        """The originals by their SHA-256, and what was written of some."""
-        return (file.name for file in self.originals.glob("*/*"))
-
-    def drop(self, name: str) -> None:
-        """Remove one of them."""
-        self.original(name).unlink(missing_ok=True)
-
     def sweep(self, older: float = -math.inf) -> None:
         """Remove what was being read when a service crashed: what is so old, s."""
         for left in self.reading.iterdir():
@@ -163,16 +110,39 @@ class DataDirectory:
             os.close(self._lock)
 
 
-def place_of_original(data: Path, sha256: str) -> Path:
-    """Place of an original in a data directory."""
-    return data / "originals" / sha256[:2] / sha256
+@contextlib.contextmanager
+def usable(path: Path) -> Iterator[None]:
+    """Where a data directory cannot be had, that is a sentence."""
+    try:
+        yield
+    except OSError as error:
+        raise StartError(
+            f"The data directory {path} cannot be used ({error.strerror}); "
+            "choose another with --data."
+        ) from None
 
 
-def _write(place: Path, data: bytes) -> None:
-    with open(place, "wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
+def check_owner(path: Path, database: str | None) -> None:
+    """Refuse a folder of another database than the PostgreSQL one of this id, or, None, its own
+    SQLite one: everything in it would look left over.
+    """
+    mark = path / MARK
+    owner = mark.read_text().strip() if mark.exists() else None
+    if owner is None and database is not None and database_of(path).exists():
+        raise StartError(
+            f"The data directory {path} holds an SQLite database; take it over with ridetune "
+            "backup and restore, and choose another directory with --data."
+        )
+    if owner is not None and database is None:
+        raise StartError(
+            f"The data directory {path} belongs to a PostgreSQL database; name it in "
+            "RIDETUNE_DATABASE, or choose another directory with --data."
+        )
+    if owner is not None and owner != database:
+        raise StartError(
+            f"The data directory {path} belongs to another PostgreSQL database; choose another "
+            "one with --data, or name its own in RIDETUNE_DATABASE."
+        )
 
 
 def database_of(path: Path) -> Path:
@@ -180,15 +150,11 @@ def database_of(path: Path) -> Path:
     return path / DATABASE
 
 
+def is_used(path: Path) -> bool:
+    """Whether a data directory is some database's."""
+    return database_of(path).exists() or (path / MARK).exists()
+
+
 def make_private(path: Path) -> None:
     """Make a data directory; other users of the machine do not look into a new one."""
     path.mkdir(mode=0o700, parents=True, exist_ok=True)
-
-
-def flush(place: Path) -> None:
-    """Wait until a file or a folder is on the disk."""
-    descriptor = os.open(place, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -13,10 +13,10 @@ from typing import Any
 
 from sqlalchemy import Connection, delete, exists, func, insert, select
 
-from .data_directory import DataDirectory
 from .database import Database
 from .errors import Busy, Unavailable
 from .limits import Limits
+from .originals import Originals
 from .storage import OUT_OF_ORDER, files_in_a_sentence
 from .tables import job_files, job_parts, jobs, mappings, measurements, uploads
 
@@ -29,9 +29,9 @@ AT_ONCE = 200
 class FileStore:
     """The files of all sessions."""
 
-    def __init__(self, database: Database, directory: DataDirectory, limits: Limits):
+    def __init__(self, database: Database, originals: Originals, limits: Limits):
         self._database = database
-        self._directory = directory
+        self._originals = originals
         self._limits = limits
 
     def keep(self, connection: Connection, files: Sequence[bytes]) -> list[str]:
@@ -40,7 +40,7 @@ class FileStore:
         self._lock(connection, hashes)
         for sha256, data in dict(zip(hashes, files, strict=True)).items():
             with files_in_a_sentence():
-                self._directory.keep(sha256, data)
+                self._originals.keep(sha256, data)
             row = select(uploads.c.sha256).where(uploads.c.sha256 == sha256)
             if connection.execute(row).one_or_none() is None:
                 connection.execute(
@@ -52,7 +52,7 @@ class FileStore:
 
     def original(self, sha256: str) -> Path:
         """Place of a file that has its row."""
-        place = self._directory.original(sha256)
+        place = self._originals.original(sha256)
         if not place.is_file():
             raise Unavailable(OUT_OF_ORDER, retry_after=30)
         return place
@@ -105,7 +105,7 @@ class FileStore:
         """Remove what a crash left behind: half-written files, and those without a row."""
         with self._database.reading() as connection:
             kept = set(connection.execute(select(uploads.c.sha256)).scalars())
-        for some in _batches(sorted(set(self._directory.names()) - kept)):
+        for some in _batches(sorted(set(self._originals.names()) - kept)):
             self._remove(some)
 
     def _remove(self, names: Sequence[str]) -> None:
@@ -119,7 +119,7 @@ class FileStore:
             with files_in_a_sentence():
                 for name in names:
                     if name not in kept:
-                        self._directory.drop(name)
+                        self._originals.drop(name)
 
     def _lock(self, connection: Connection, names: Iterable[str]) -> None:
         self._database.lock(connection, {f"originals/{name[:2]}" for name in names})

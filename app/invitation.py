@@ -24,7 +24,7 @@ def last_address(settings: Settings) -> str:
     except FileNotFoundError:
         raise StartError(
             f"No service has run with the data directory {settings.data} yet; start one with "
-            "`ridetune serve`."
+            "`ridetune serve`, or name another with --data."
         ) from None
 
 
@@ -33,12 +33,17 @@ def link(address: str, secret: str) -> str:
     return f"{address}/?token={quote(secret)}"
 
 
-def link_command(settings: Settings) -> str:
-    """What makes a link, as it can be typed on this machine; who comes from others is told no
-    paths of it.
+def visitors_link_command(settings: Settings) -> str:
+    """What makes a link, as a page tells it: who comes from other machines is told no paths of
+    this one.
     """
     if settings.public_url or settings.allowed_hosts or not is_loopback(settings.host):
         return "ridetune link"
+    return link_command(settings)
+
+
+def link_command(settings: Settings) -> str:
+    """What makes a link, as it can be typed on this machine."""
     elsewhere = settings.data.absolute() != usual_data(os.environ).absolute()
     data = ["--data", str(settings.data.absolute())] if elsewhere else []
     return shlex.join([_program(), "link", *data])

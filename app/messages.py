@@ -7,7 +7,7 @@ from fastapi.responses import HTMLResponse
 from starlette.requests import Request
 
 from .browser_store import BROWSER_SECONDS, LINK_SECONDS
-from .invitation import link_command
+from .invitation import visitors_link_command
 from .package_files import package_folder
 from .settings import Settings
 
@@ -78,7 +78,7 @@ def _ways_in(request: Request, settings: Settings) -> list[str]:
     ways.append(
         "<p>A new link lets this browser in. Type this in a terminal on the machine where ridetune "
         "runs, and open here what it prints:</p>"
-        f"<pre><code>{escape(link_command(settings))}</code></pre>"
+        f"<pre><code>{escape(visitors_link_command(settings))}</code></pre>"
         "<p class=soft>The browser then stays let in, over restarts too, until it has not come "
         f"for {DAYS} days.</p>"
     )

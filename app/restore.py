@@ -12,18 +12,20 @@ import shutil
 import struct
 import zlib
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 from zipfile import BadZipFile, ZipFile
 
 from sqlalchemy import select
+from sqlalchemy.exc import IntegrityError
 
 from .backup import CHUNK, FORMAT, KIND, MANIFEST, ORIGINALS, Kept, copy_rows, counted
-from .data_directory import DATABASE, MARK, DataDirectory, flush
+from .data_directory import DATABASE, MARK, DataDirectory, usable
 from .database import Database
 from .errors import BackupError
+from .originals import flush
 from .postgresql import PostgresqlDatabase
 from .settings import Settings
 from .sqlite import SqliteDatabase
@@ -31,6 +33,7 @@ from .tables import SCHEMA_VERSION, uploads
 
 NAME = re.compile(rf"{ORIGINALS}/([0-9a-f]{{2}})/(\1[0-9a-f]{{62}})|{re.escape(DATABASE)}")
 LONGEST_MANIFEST = 200_000_000
+IN_USE = "The database of RIDETUNE_DATABASE is not empty; a backup is restored into a fresh one."
 UNREADABLE = (
     *(BadZipFile, EOFError, NotImplementedError, OSError, RuntimeError, ValueError),
     *(struct.error, zlib.error),
@@ -57,9 +60,14 @@ def restore(path: Path, settings: Settings) -> Kept:
             if wanted != held:
                 raise _damaged(path, "its rows and its files are not of one backup")
             if settings.database:
-                _to_postgresql(archive, files, rows, settings)
+                with _unclaimed_again(settings.data):
+                    _to_postgresql(archive, files, rows, settings)
                 return kept
-        with closing(DataDirectory(settings.data)) as directory, _all_or_none(directory) as put:
+        with (
+            _unclaimed_again(settings.data),
+            closing(DataDirectory(settings.data)) as directory,
+            _all_or_none(directory) as put,
+        ):
             put(archive, files)
             _move(copy, directory.database)
     return kept
@@ -69,22 +77,25 @@ def _to_postgresql(
     archive: ZipFile, files: dict[str, Any], rows: Database, settings: Settings
 ) -> None:
     with closing(PostgresqlDatabase(settings.database)) as database:
+        if any(vars(counted(database)).values()):
+            raise BackupError(IN_USE)
         directory = DataDirectory(settings.data, database.id)
         with _all_or_none(directory) as put:
-            if any(vars(counted(database)).values()):
-                raise BackupError(
-                    "The database of RIDETUNE_DATABASE is not empty; a backup is restored into a "
-                    "fresh one."
-                )
             put(archive, files)
-            with rows.reading() as source, database.writing() as target:
-                copy_rows(source, target)
+            try:
+                with rows.reading() as source, database.writing() as target:
+                    copy_rows(source, target)
+            except IntegrityError:  # by a key, or by whoever was let in
+                raise BackupError(IN_USE) from None
 
 
 def _require_empty(settings: Settings) -> None:
     data = settings.data
     in_the_way = [DATABASE] if settings.database else [DATABASE, MARK]
-    if any((data / name).exists() for name in in_the_way) or any(data.glob(f"{ORIGINALS}/*/*")):
+    with usable(data):
+        held = any((data / name).exists() for name in in_the_way)
+        held = held or any(data.glob(f"{ORIGINALS}/*/*"))
+    if held:
         raise BackupError(
             f"The directory {data} holds data already; a backup is restored into an empty one, "
             "named with --data."
@@ -153,6 +164,25 @@ def _chunks(archive: ZipFile, path: Path, name: str) -> Iterator[bytes]:
                 yield chunk
     except UNREADABLE:
         raise _damaged(path, f"{name} cannot be read") from None
+
+
+@contextmanager
+def _unclaimed_again(data: Path) -> Iterator[None]:
+    """On an error what was made of a data directory goes, so that any database may have it."""
+    names = (MARK, "owner.lock", ORIGINALS, "reading", "")
+    made = [data / name for name in names if not (data / name).exists()]
+    try:
+        yield
+    except BaseException:
+        for place in made:
+            with suppress(OSError):
+                if place.name == ORIGINALS:
+                    shutil.rmtree(place)
+                elif place.is_dir():
+                    place.rmdir()
+                else:
+                    place.unlink()
+        raise
 
 
 @contextmanager

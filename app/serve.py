@@ -12,7 +12,7 @@ from .errors import StartError
 from .invitation import link, link_command, note_address
 from .main import create_app
 from .server import CUT_OFF_SECONDS, Server
-from .settings import Settings
+from .settings import EVERY_ADDRESS, Settings
 from .store import Store
 
 FILES = 65_536
@@ -71,6 +71,11 @@ def _invite(settings: Settings, store: Store, address: str) -> None:
             f"Open {link(address, store.browsers.make_link())}\n"
             "This link lets one browser in, which then stays let in; for another: "
             f"{link_command(settings)}"
+        )
+    if settings.host in EVERY_ADDRESS:
+        told += (
+            f"\nIt answers to the names {', '.join(sorted(settings.host_names()))} alone; "
+            "RIDETUNE_ALLOWED_HOSTS adds others by which it is reached."
         )
     print(f"{told}\nData are kept in {settings.data}.", flush=True)
 

@@ -26,8 +26,8 @@ from .limits import Limits
 from .measurement import NewMeasurement
 from .measurement_store import MeasurementStore
 from .secret import hashed, new_secret
-from .session_row import GONE
-from .tables import jobs, sessions
+from .session_row import GONE, delete_sessions
+from .tables import sessions
 
 UNUSED_AFTER = 3600.0
 
@@ -109,7 +109,8 @@ class SessionStore:
         if not _has_room(connection, now, true(), self._limits.sessions):
             raise Unavailable(
                 f"The service already keeps {self._limits.sessions} sessions; delete one that is "
-                "no longer needed, or try again later.",
+                "no longer needed, try again later, or ask whoever runs it, who can delete some "
+                "with `ridetune sessions`.",
                 retry_after=600,
             )
 
@@ -143,10 +144,7 @@ class SessionStore:
     def delete(self, session: str) -> None:
         """Remove a workspace with all its measurements, jobs and results."""
         with self._database.writing() as connection:
-            # In the order in which whoever locks several jobs does.
-            mine = select(jobs.c.id).where(jobs.c.session == session).order_by(jobs.c.id)
-            connection.execute(mine.with_for_update())
-            connection.execute(delete(sessions).where(sessions.c.id == session))
+            delete_sessions(connection, [session])
         self._removed()
         self._files.drop_unreferenced()
 

@@ -5,6 +5,7 @@ Every setting has an environment variable, and what is named like one but is non
 
 import math
 import os
+import shlex
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -42,6 +43,12 @@ NAMES = (
 )
 VARIABLES = (*(OURS + name for name in NAMES), *LIMITS)
 """All there are."""
+
+EVERY_ADDRESS = ("0.0.0.0", "::")
+"""To listen there; nobody's name for the service."""
+TOKEN_LENGTH = 16
+"""The least, which nobody guesses if it is random."""
+MAKES_TOKEN = 'python3 -c "import secrets; print(secrets.token_hex(24))"'
 
 Choice = TypeVar("Choice", bound=str)
 
@@ -151,8 +158,9 @@ class Settings:
         if not (self.token or self.proxy_user_header or keys):
             raise StartError(
                 f"Listening on {self.host} would open the service to other machines; set "
-                "RIDETUNE_TOKEN to a secret that visitors must bring, make a key with `ridetune "
-                "keys add`, set up the login of a proxy, or use --host 127.0.0.1."
+                "RIDETUNE_TOKEN to a secret that visitors must bring, make a key with "
+                f"`{shlex.join(['ridetune', 'keys', 'add', 'NAME', '--data', str(self.data)])}`, "
+                "set up the login of a proxy, or use --host 127.0.0.1."
             )
 
     @property
@@ -162,7 +170,7 @@ class Settings:
 
     def host_names(self) -> frozenset[str]:
         """Names a request's Host header may carry, lower case and without port."""
-        own = () if self.host in ("0.0.0.0", "::") else (in_brackets(self.host),)
+        own = () if self.host in EVERY_ADDRESS else (in_brackets(self.host),)
         public = (without_port(urlsplit(self.public_url).netloc),) if self.public_url else ()
         names = ("localhost", "127.0.0.1", "[::1]", *own, *public, *self.allowed_hosts)
         return frozenset(name.lower() for name in names)
@@ -192,11 +200,18 @@ def _host_names(text: str) -> tuple[str, ...]:
 
 
 def _token(text: str) -> str:
-    """A secret that comes unchanged out of an address, where + is a space."""
+    """A secret that nobody guesses, and that comes unchanged out of an address, where + is a
+    space.
+    """
     if text and quote(text, safe="") != text:
         raise StartError(
             "RIDETUNE_TOKEN has characters that an address changes; make one of letters and "
-            "digits, as `openssl rand -hex 24` does."
+            f"digits, as `{MAKES_TOKEN}` does."
+        )
+    if 0 < len(text) < TOKEN_LENGTH:
+        raise StartError(
+            f"RIDETUNE_TOKEN has fewer than {TOKEN_LENGTH} characters and could be guessed; make "
+            f"one with `{MAKES_TOKEN}`."
         )
     return text
 

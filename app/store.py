@@ -12,7 +12,7 @@ from typing import Any
 from sqlalchemy import delete, insert, select
 
 from .browser_store import BrowserStore
-from .data_directory import DataDirectory, database_of
+from .data_directory import DataDirectory, check_owner, database_of
 from .database import Database
 from .errors import NotFound
 from .file_store import FileStore
@@ -151,7 +151,16 @@ class Store:
 
 def database_beside(path: Path, url: str) -> Database:
     """The database of a data directory, opened beside the service that uses both."""
-    return PostgresqlDatabase(url) if url else SqliteDatabase(database_of(path))
+    if not url:
+        check_owner(path, None)
+        return SqliteDatabase(database_of(path))
+    database = PostgresqlDatabase(url)
+    try:
+        check_owner(path, database.id)
+    except BaseException:
+        database.close()
+        raise
+    return database
 
 
 def _open(path: Path) -> tuple[Database, DataDirectory]:

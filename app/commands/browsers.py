@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from ..browser_store import Browser, BrowserStore
 from ..settings import Settings
-from .kept import kept
+from .kept import kept, place
 from .output import minute, print_table
 
 
@@ -18,12 +18,15 @@ def browsers(options: Namespace) -> None:
             store.remove(options.ids)
             print(
                 f"Ended: {', '.join(options.ids)}. A session that such a browser has begun stays "
-                "open to it until the session is deleted."
+                "open to it until `ridetune sessions remove` deletes it, or somebody in it."
             )
         elif known := store.list():
             _print(known)
         else:
-            print("No browser is let in; `ridetune link` makes a link that lets one in.")
+            print(
+                f"No browser is let in by what is kept in {place(settings)}; `ridetune link` makes "
+                "a link that lets one in, another directory is named with --data."
+            )
 
 
 def _print(known: Sequence[Browser]) -> None:

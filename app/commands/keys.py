@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ..key_store import Key, KeyStore
 from ..settings import Settings
-from .kept import kept
+from .kept import kept, place
 from .output import minute, print_table
 
 
@@ -17,14 +17,21 @@ def keys(options: Namespace) -> None:
         store = KeyStore(database)
         if options.action == "add":
             print(store.add(options.name))
-            print("It is shown this once; send it as Authorization: Bearer ...", file=sys.stderr)
+            print(
+                f"It is kept in {place(settings)}, and shown this once; send it to the service "
+                "there as Authorization: Bearer ...",
+                file=sys.stderr,
+            )
         elif options.action == "remove":
             store.remove(options.name)
             print(f"The key {options.name!r} is ended; its sessions wait for a key of that name.")
         elif known := store.list():
             _print(known)
         else:
-            print("There is no key yet; `ridetune keys add NAME` makes one.")
+            print(
+                f"There is no key in {place(settings)}; `ridetune keys add NAME` makes one, "
+                "another directory is named with --data."
+            )
 
 
 def _print(known: Sequence[Key]) -> None:

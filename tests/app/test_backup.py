@@ -308,6 +308,13 @@ def test_a_bit_that_turned_over_is_found(tmp_path, backup, capsys):
         assert harmless or (str(backup) in told_of and not there.exists()), place
 
 
+def test_a_file_is_no_place_for_a_restore(tmp_path, backup, capsys):
+    (tmp_path / "file").touch()
+    told = refused(capsys, "restore", str(backup), "--data", str(tmp_path / "file"))
+    assert "file cannot be used (" in told
+    assert (tmp_path / "file").is_file()
+
+
 def test_a_folder_is_no_backup(tmp_path, capsys):
     there = tmp_path / "there"
     assert "cannot be read" in refused(capsys, "restore", str(tmp_path), "--data", str(there))
@@ -329,9 +336,48 @@ def test_what_is_there_is_not_written_over(tmp_path, backup, command, capsys, on
     assert list((shared / "originals").rglob("*")) == []
 
 
-def test_a_restore_that_fails_half_way_leaves_nothing(tmp_path, backup, capsys, monkeypatch):
-    """Oracle: the same restore succeeds afterwards."""
+def test_a_restore_into_a_database_in_use_claims_no_directory(
+    tmp_path, backup, command, capsys, monkeypatch, on_postgresql, postgresql
+):
+    """Oracle: the same directory goes with an empty database afterwards."""
+    store = Store(tmp_path / "shared", Limits(), on_postgresql)
+    store.sessions.create(CAR, [])
+    store.close()
+    monkeypatch.setenv("RIDETUNE_DATABASE", on_postgresql)
     there = tmp_path / "there"
+    assert "is not empty" in refused(capsys, "restore", str(backup), "--data", str(there))
+    assert not there.exists()
+    with postgresql.database() as empty:
+        command(empty, "restore", backup, "--data", there)
+
+
+def test_a_restore_over_a_key_of_the_same_name_is_refused(
+    tmp_path, command, capsys, monkeypatch, on_postgresql
+):
+    """Of which only one could be kept; nothing is restored."""
+    here, there, file = tmp_path / "here", tmp_path / "there", tmp_path / "backup.zip"
+    store = Store(here, Limits())
+    filled(store)
+    store.keys.add("rig")
+    store.close()
+    command("", "backup", "--data", here, "-o", file)
+    command(on_postgresql, "keys", "add", "rig")
+    capsys.readouterr()
+    assert "is not empty" in refused(capsys, "restore", str(file), "--data", str(there))
+    assert not there.exists()
+    command(on_postgresql, "keys", "remove", "rig")
+    command(on_postgresql, "restore", file, "--data", there)
+
+
+def test_a_restore_that_fails_half_way_leaves_nothing(
+    tmp_path, backup, capsys, monkeypatch, database
+):
+    """Neither in a new directory nor in one that was there; the same restore succeeds then."""
+    monkeypatch.setenv("RIDETUNE_DATABASE", database)
+    there = tmp_path / "there"
+    there.mkdir()
+    (there / "address").touch()
+    new = tmp_path / "new"
     kept = []
 
     def keep(self, sha256, data):
@@ -343,9 +389,13 @@ def test_a_restore_that_fails_half_way_leaves_nothing(tmp_path, backup, capsys, 
     true = DataDirectory.keep
     with monkeypatch.context() as patch:
         patch.setattr(DataDirectory, "keep", keep)
-        command = ("restore", str(backup), "--data", str(there))
-        assert "No space left on device" in refused(capsys, *command)
-    assert main(list(command)) == 0
+        for data, left in ((there, [there / "address"]), (new, [])):
+            kept.clear()
+            command = ("restore", str(backup), "--data", str(data))
+            assert "No space left on device" in refused(capsys, *command)
+            assert list(data.rglob("*")) == left
+    assert not new.exists()
+    assert main(["restore", str(backup), "--data", str(there)]) == 0
 
 
 @pytest.mark.parametrize("version", [1, 4, 6])

@@ -2,6 +2,11 @@
 
 from ridetune.app import jobs_under_way
 from ridetune.app.errors import Unavailable
+from ridetune.app.file_store import FileStore
+from ridetune.app.kept_sessions import KeptSessions
+from ridetune.app.limits import Limits
+from ridetune.app.originals import Originals
+from ridetune.app.store import database_beside
 from ridetune.app.tables import jobs
 from sqlalchemy import update
 
@@ -132,3 +137,19 @@ def test_units_that_are_lost_now_and_then_do_not_fail_their_job(team):
         until(lambda: f"{job}/d" in cluster.tasks)
         cluster.lose(f"{job}/d", with_worker=True)
     until(lambda: team.state(job) == "failed")
+
+
+def test_jobs_of_sessions_that_another_process_deletes_are_stopped(team, tmp_path, database):
+    """By `ridetune sessions remove` beside the service; nothing of them is left, others go on."""
+    cluster = team.dispatch()
+    fit, cut = team.submit("fit", team.ann), team.submit("sweep", team.ann, "ab")
+    until(lambda: {fit, f"{cut}/a", f"{cut}/b"} == set(cluster.tasks))
+    make(cluster, cut, "a")
+    until(lambda: len(team.store.parts(cut)) == 1)
+    other = team.submit("fit", team.bob)
+    until(lambda: other in cluster.tasks)
+    beside = database_beside(tmp_path, database)
+    KeptSessions(beside, FileStore(beside, Originals(tmp_path), Limits())).remove([team.ann])
+    beside.close()
+    until(lambda: set(cluster.tasks) == {other})
+    assert list(team.store.directory.names()) == []

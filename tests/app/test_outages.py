@@ -122,8 +122,8 @@ DISKS = {
     "out of memory": (errno.ENOMEM, 503, "too little memory"),
 }
 PLACES = {
-    "flushing": "ridetune.app.data_directory.os.fsync",
-    "renaming": "ridetune.app.data_directory.os.replace",
+    "flushing": "ridetune.app.originals.os.fsync",
+    "renaming": "ridetune.app.originals.os.replace",
     "reading": "ridetune.app.recordings.NamedTemporaryFile",
     "starting a reader": "ridetune.engine.formats.child.subprocess.Popen",
     "receiving": "ridetune.app.uploads.SpooledTemporaryFile",

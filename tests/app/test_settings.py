@@ -1,6 +1,9 @@
 """Settings come from the environment; a wrong one is a sentence, a public bind a way to get in."""
 
 import re
+import shlex
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -167,6 +170,19 @@ def test_a_token_that_an_address_changes_is_refused(token):
     with pytest.raises(StartError, match="RIDETUNE_TOKEN has characters") as refused:
         Settings.from_environment(data="x", environment={"RIDETUNE_TOKEN": token})
     assert token not in str(refused.value)
+
+
+@pytest.mark.parametrize("token", ["abc", "0123456789abcde"])
+def test_a_token_that_can_be_guessed_is_refused_with_what_makes_a_better_one(token):
+    """Oracle: the command of the sentence, run; the sentence does not repeat the token."""
+    with pytest.raises(StartError, match="fewer than 16 characters") as refused:
+        Settings.from_environment(data="x", environment={"RIDETUNE_TOKEN": token})
+    assert token not in str(refused.value)
+    command = shlex.split(re.search("`(.*)`", str(refused.value))[1])
+    made = subprocess.run([sys.executable, *command[1:]], capture_output=True, text=True)
+    for good in (made.stdout.strip(), "0123456789abcdef"):
+        settings = Settings.from_environment(data="x", environment={"RIDETUNE_TOKEN": good})
+        assert settings.token == good
 
 
 def test_an_address_of_ipv6_is_a_host_name_in_brackets():

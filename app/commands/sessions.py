@@ -1,0 +1,57 @@
+"""`ridetune sessions`: which sessions the service keeps, and an end of some."""
+
+from argparse import Namespace
+from collections.abc import Sequence
+
+from ..file_store import FileStore
+from ..kept_sessions import KeptSession, KeptSessions
+from ..originals import Originals
+from ..settings import Settings
+from .kept import kept, place
+from .output import minute, print_table
+
+
+def sessions(options: Namespace) -> None:
+    """List all sessions, or delete some with all they hold."""
+    settings = Settings.from_environment(data=options.data)
+    with kept(settings, files=options.action == "remove") as database:
+        files = FileStore(database, Originals(settings.data), settings.limits)
+        store = KeptSessions(database, files)
+        if options.action == "remove":
+            store.remove(options.ids)
+            print(
+                f"Deleted with all they held: {', '.join(options.ids)}. A running service stops "
+                "their jobs within some seconds."
+            )
+        elif known := store.list():
+            _print(known)
+        else:
+            print(
+                f"There is no session in {place(settings)}; another directory is named with --data."
+            )
+
+
+def _print(known: Sequence[KeptSession]) -> None:
+    rows = (
+        (
+            session.id,
+            _owner(session.owner),
+            minute(session.created),
+            minute(session.seen),
+            str(session.measurements),
+            str(session.jobs),
+            f"{session.bytes / 1e6:.1f}",
+        )
+        for session in known
+    )
+    head = ("id", "owner", "created", "used last", "recordings", "jobs", "MB of files")
+    print_table([head, *rows], right=(4, 5, 6))
+
+
+def _owner(owner: str | None) -> str:
+    """A user as a person calls them; whatever a proxy has sent, it is one line."""
+    if owner is None:
+        return "a browser"
+    kind, _, name = owner.partition(":")
+    shown = "".join(letter if letter.isprintable() else "?" for letter in name)
+    return f"{kind} {shown}"
