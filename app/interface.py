@@ -11,11 +11,12 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from fastapi.routing import APIRoute
 
-from .interface_shapes import EXAMPLES, FILES, JOB, JOB_KINDS, MEASUREMENT, PROBLEM, SHOWN
+from .interface_shapes import EXAMPLES, FILES, JOB, JOB_KINDS, MEASUREMENT, PROBLEM, SHOWN, TEXT
 from .problems import MEDIA_TYPE
 
 PROBLEMS = {
     400: "The body cannot be read.",
+    401: "The bearer has the form of an API key, but no such key is known (any more).",
     403: "The request comes from another host or page, or from who was not let in.",
     404: "There is nothing by that name, or it is not the caller's.",
     406: "The reply cannot be had in the form asked for.",
@@ -105,6 +106,7 @@ def _completed(document: dict[str, Any]) -> dict[str, Any]:
         f"Problem{status}": {"description": said, "content": {MEDIA_TYPE: _reference("Problem")}}
         for status, said in PROBLEMS.items()
     }
+    components["responses"]["Problem401"]["headers"] = {"WWW-Authenticate": {"schema": TEXT}}
     components["securitySchemes"] = {
         "session": {
             "type": "http",
@@ -156,6 +158,8 @@ def _complete(path: str, method: str, operation: dict[str, Any]) -> None:
 def _problems(path: str, method: str, operation: Mapping[str, Any]) -> set[int]:
     """Statuses of problems that a route may answer with."""
     found = {403, *ALSO.get(operation["operationId"], ())}
+    if path.startswith("/api/"):
+        found.add(401)
     if path.startswith(SESSIONS):
         # The database may be out of reach.
         found |= {503} if method == "get" else {503, 507}
