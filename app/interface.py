@@ -11,7 +11,17 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from fastapi.routing import APIRoute
 
-from .interface_shapes import EXAMPLES, FILES, JOB, JOB_KINDS, MEASUREMENT, PROBLEM, SHOWN, TEXT
+from .interface_shapes import (
+    EXAMPLES,
+    FILES,
+    JOB,
+    JOB_KINDS,
+    MEASUREMENT,
+    OWN_SESSION,
+    PROBLEM,
+    SHOWN,
+    TEXT,
+)
 from .problems import MEDIA_TYPE
 
 PROBLEMS = {
@@ -101,7 +111,12 @@ def _completed(document: dict[str, Any]) -> dict[str, Any]:
     components = document["components"]
     for unused in ("HTTPValidationError", "ValidationError"):
         components["schemas"].pop(unused, None)
-    components["schemas"] |= {"Problem": PROBLEM, "Job": JOB, "Measurement": MEASUREMENT}
+    components["schemas"] |= {
+        "Problem": PROBLEM,
+        "Job": JOB,
+        "Measurement": MEASUREMENT,
+        "OwnSession": OWN_SESSION,
+    }
     components["responses"] = {
         f"Problem{status}": {"description": said, "content": {MEDIA_TYPE: _reference("Problem")}}
         for status, said in PROBLEMS.items()
