@@ -25,7 +25,9 @@ from .services import services_of
 
 
 def session_of(connection: HTTPConnection, sid: str) -> str:
-    """The session's id if it is the caller's, asked of the database; NotFound otherwise."""
+    """The session's id if it is the caller's, asked of the database; NotFound otherwise, and
+    UnknownKey for a key that is none.
+    """
     _owner(connection, sid)
     return sid
 

@@ -42,6 +42,19 @@ class Forbidden(ServiceError):
     code, status = "forbidden", 403
 
 
+class UnknownKey(ServiceError):
+    """The bearer has the form of an API key and is none, or none any more."""
+
+    code, status = "unknown-key", 401
+
+    def __init__(self):
+        super().__init__(
+            "The API key that was sent is not known, or was removed; send one that `ridetune keys "
+            "add` has shown (`ridetune keys list` has the beginnings of those there are)."
+        )
+        self.headers = {"WWW-Authenticate": "Bearer"}
+
+
 class NotFound(ServiceError):
     """Nothing by that name in this session."""
 

@@ -11,11 +11,22 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from fastapi.routing import APIRoute
 
-from .interface_shapes import EXAMPLES, FILES, JOB, JOB_KINDS, MEASUREMENT, PROBLEM, SHOWN
+from .interface_shapes import (
+    EXAMPLES,
+    FILES,
+    JOB,
+    JOB_KINDS,
+    MEASUREMENT,
+    OWN_SESSION,
+    PROBLEM,
+    SHOWN,
+    TEXT,
+)
 from .problems import MEDIA_TYPE
 
 PROBLEMS = {
     400: "The body cannot be read.",
+    401: "The bearer has the form of an API key, but no such key is known (any more).",
     403: "The request comes from another host or page, or from who was not let in.",
     404: "There is nothing by that name, or it is not the caller's.",
     406: "The reply cannot be had in the form asked for.",
@@ -100,11 +111,17 @@ def _completed(document: dict[str, Any]) -> dict[str, Any]:
     components = document["components"]
     for unused in ("HTTPValidationError", "ValidationError"):
         components["schemas"].pop(unused, None)
-    components["schemas"] |= {"Problem": PROBLEM, "Job": JOB, "Measurement": MEASUREMENT}
+    components["schemas"] |= {
+        "Problem": PROBLEM,
+        "Job": JOB,
+        "Measurement": MEASUREMENT,
+        "OwnSession": OWN_SESSION,
+    }
     components["responses"] = {
         f"Problem{status}": {"description": said, "content": {MEDIA_TYPE: _reference("Problem")}}
         for status, said in PROBLEMS.items()
     }
+    components["responses"]["Problem401"]["headers"] = {"WWW-Authenticate": {"schema": TEXT}}
     components["securitySchemes"] = {
         "session": {
             "type": "http",
@@ -156,6 +173,8 @@ def _complete(path: str, method: str, operation: dict[str, Any]) -> None:
 def _problems(path: str, method: str, operation: Mapping[str, Any]) -> set[int]:
     """Statuses of problems that a route may answer with."""
     found = {403, *ALSO.get(operation["operationId"], ())}
+    if path.startswith("/api/"):
+        found.add(401)
     if path.startswith(SESSIONS):
         # The database may be out of reach.
         found |= {503} if method == "get" else {503, 507}

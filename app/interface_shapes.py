@@ -52,9 +52,15 @@ MEASUREMENT = _object(
     description="An uploaded recording; what else there is, was found in it or told of it.",
 )
 
+OWN_SESSION = _object(
+    {"id": TEXT, "created": INSTANT, "seen": INSTANT},
+    description="A session of the caller's; `seen` is when it was used last, to a minute.",
+)
+
 JOB_KINDS = ("identifications", "profiles", "sweeps", "validations", "campaigns")
 
 SHOWN: dict[str, tuple[str, bool]] = {
+    "sessions_sessions": ("OwnSession", True),
     **{f"{jobs}_{name}": ("Job", False) for jobs in JOB_KINDS for name in ("submit", "one")},
     **{f"{jobs}_cancel": ("Job", False) for jobs in JOB_KINDS},
     **{f"{jobs}_all_of_session": ("Job", True) for jobs in JOB_KINDS},

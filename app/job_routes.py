@@ -2,7 +2,6 @@
 
 from collections.abc import AsyncIterator, Callable, Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from functools import partial
 from typing import Annotated, Any
 
@@ -12,6 +11,7 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from .access import SessionId, session_of
 from .errors import NotFound
 from .frames import clean
+from .instants import instant
 from .job_row import Job
 from .services import Services, Shared
 from .strict_json import StrictRoute
@@ -34,9 +34,9 @@ def job_to_json(job: Job, view: View, *, with_result: bool = False) -> dict[str,
         "id": job.id,
         "kind": job.kind,
         "state": job.state,
-        "created": _instant(job.created),
-        "started": _instant(job.started),
-        "finished": _instant(job.finished),
+        "created": instant(job.created),
+        "started": instant(job.started),
+        "finished": instant(job.finished),
         **view.asked(job),
         "progress": job.progress,
         "error": job.error,
@@ -70,10 +70,6 @@ async def submitted(
         return job_to_json(job, view)
 
     return await services.interactive.run(sid, found_or_queued)
-
-
-def _instant(seconds: float | None) -> str | None:
-    return None if seconds is None else datetime.fromtimestamp(seconds, UTC).isoformat()
 
 
 def job_router(name: str, view: View) -> APIRouter:

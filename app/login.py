@@ -2,7 +2,8 @@
 
 It is whoever brings an API key or the service's token as a bearer, a user whom the proxy names, and
 a browser that was let in once: by a link that is good for one browser, or by the service's token in
-the address. Keys and the proxy tell who it is; their sessions belong to that user.
+the address. Keys and the proxy tell who it is; their sessions belong to that user. Who brings a key
+that is not known is told so, whatever else would let them in.
 """
 
 import hmac
@@ -12,7 +13,8 @@ from starlette.requests import HTTPConnection
 
 from . import cookies, logs
 from .callers import caller_of
-from .errors import Forbidden
+from .errors import Forbidden, UnknownKey
+from .key_store import PREFIX
 from .origins import bearer
 from .proxy_login import proxy_user
 from .services import services_of
@@ -20,10 +22,9 @@ from .services import services_of
 
 def user_of(connection: HTTPConnection) -> str | None:
     """Who calls, where that is known: `key:` or `user:` and a name; told in the log."""
-    services = services_of(connection)
-    if (key := services.store.keys.name_of(bearer(connection.headers))) is not None:
+    if (key := _key_of(connection)) is not None:
         user = f"key:{key}"
-    elif (named := proxy_user(connection.scope, services.settings)) is not None:
+    elif (named := proxy_user(connection.scope, services_of(connection).settings)) is not None:
         user = f"user:{named}"
     else:
         return None
@@ -44,9 +45,8 @@ def is_let_in(connection: HTTPConnection) -> bool:
 
 def brings_secret(connection: HTTPConnection) -> bool:
     """Whether the caller's bearer is an API key or the service's token, as a program's is."""
-    brought = bearer(connection.headers)
-    known = services_of(connection).store.keys.name_of(brought) is not None
-    return known or _is_service_token(connection, brought)
+    known = _key_of(connection) is not None
+    return known or _is_service_token(connection, bearer(connection.headers))
 
 
 def require_let_in(connection: HTTPConnection) -> None:
@@ -70,6 +70,18 @@ def let_in(connection: HTTPConnection, response: Response, token: str) -> bool:
         secret = browsers.let_in(services.settings.token if known else "")
         cookies.give_access(connection, response, secret)
     return True
+
+
+def _key_of(connection: HTTPConnection) -> str | None:
+    """Name of the key that is brought, None where the bearer is no key, or there is none."""
+    brought, store = bearer(connection.headers), services_of(connection).store
+    name = store.keys.name_of(brought)
+    if name is None and brought.startswith(PREFIX):
+        # Other tokens may begin like a key: the service's as it was chosen, a session's by chance.
+        opens = store.owners.sessions(user=None, tokens=[brought])
+        if not (opens or _is_service_token(connection, brought)):
+            raise UnknownKey
+    return name
 
 
 def _is_service_token(connection: HTTPConnection, brought: str) -> bool:

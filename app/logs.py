@@ -98,6 +98,7 @@ def configure_worker() -> None:
         level = os.environ.get(LEVEL, "")
         configure("json" if form == "json" else "text", level if level in LEVELS else "WARNING")
         adopt("distributed")
+        logging.getLogger("distributed.worker.state_machine").addFilter(_unless_closing)
 
 
 def adopt(*loggers: str) -> None:
@@ -110,6 +111,13 @@ def adopt(*loggers: str) -> None:
 
 
 _root = logging.getLogger()
+
+
+def _unless_closing(record: logging.LogRecord) -> bool:
+    """A Dask worker that ends in good order warns of each task that it had; whoever ended it knows,
+    and has the task run again.
+    """
+    return not record.getMessage().endswith("ended with CancelledError")
 
 
 def _log_thread(failed: threading.ExceptHookArgs) -> None:

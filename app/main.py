@@ -36,6 +36,7 @@ from .campaign_job import campaign
 from .cluster import Cluster
 from .draining import Drain, Draining
 from .guard import Guard
+from .heads import Heads
 from .heartbeat import beat
 from .identification_job import KIND as IDENTIFICATION
 from .identification_job import identify_runs, of_recordings
@@ -145,6 +146,7 @@ def create_app(
     app.openapi = describe(app)
     reply_to_errors(app)
     # The last one is the outermost.
+    app.add_middleware(Heads)
     app.add_middleware(Unexpected)
     app.add_middleware(Drain, draining=draining)
     app.add_middleware(Guard, settings=settings)

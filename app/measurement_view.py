@@ -1,9 +1,9 @@
 """Measurements as the REST interface shows them, beside others of their session."""
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
 from typing import Any
 
+from .instants import instant
 from .measurement import Measurement
 from .store import Store
 
@@ -43,7 +43,7 @@ def _shown(kept: Measurement, oldest: Measurement) -> dict[str, Any]:
         "name": kept.name,
         "bytes": kept.bytes,
         "sha256": kept.sha256,
-        "created": datetime.fromtimestamp(kept.created, UTC).isoformat(),
+        "created": instant(kept.created),
         "sample": kept.sample,
         "noise": kept.noise,
         "manoeuvre": kept.manoeuvre,

@@ -21,7 +21,7 @@ SEEN_EVERY = 60.0
 
 @dataclass(frozen=True)
 class OwnSession:
-    """A session in the list of its owner's."""
+    """A session in the list of its owner's; instants in s since the epoch."""
 
     id: str
     created: float

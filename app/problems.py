@@ -98,9 +98,12 @@ def reply_to_errors(app: FastAPI) -> None:
         detail = str(error.detail).rstrip(".") + "."
         if error.status_code == 404:
             detail = "There is nothing at this address; see /api/openapi.json for what there is."
+        headers = dict(error.headers or {})
         if error.status_code == 405:
             detail = "This address does not take that method; see /api/openapi.json."
-        return problem(error.status_code, code, detail, headers=error.headers)
+            if headers.get("Allow") == "GET":
+                headers["Allow"] = "GET, HEAD"  # see heads.py
+        return problem(error.status_code, code, detail, headers=headers)
 
 
 class Unexpected:

@@ -8,6 +8,7 @@ from fastapi.responses import FileResponse, RedirectResponse, Response
 from . import cookies, messages
 from .access import give_session, opened_session, own_sessions
 from .errors import NotFound
+from .heads import wants_head_alone
 from .login import is_let_in, let_in
 from .package_files import package_folder
 from .services import Shared
@@ -24,9 +25,12 @@ def start(request: Request, services: Shared) -> Response:
     token = request.query_params.get("token", "")
     query = urlencode([pair for pair in rest if pair[0] != "token"])
     response = RedirectResponse("", 303)
-    opened = bool(token) and let_in(request, response, token)
+    alone = wants_head_alone(request)
+    opened = bool(token) and not alone and let_in(request, response, token)
     if own := own_sessions(request):
         sid = own[0].id
+    elif alone and is_let_in(request):
+        return Response()  # a GET leads to a fresh session
     elif opened or is_let_in(request):
         sid = give_session(request, response)["id"]
     elif token:

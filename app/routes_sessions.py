@@ -4,7 +4,6 @@ What is asked for most goes to a thread once; of a handler that is not asynchron
 the reply's check to a second one.
 """
 
-from dataclasses import asdict
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Request, Response
@@ -13,6 +12,7 @@ from starlette.concurrency import run_in_threadpool
 from ..engine.vehicle_file import vehicle_from_json, vehicle_to_json
 from . import cookies
 from .access import SessionId, give_session, own_sessions
+from .instants import instant
 from .job_routes import all_to_json
 from .login import require_let_in
 from .measurement_view import measurements_to_json
@@ -40,7 +40,10 @@ def create(request: Request, response: Response) -> dict[str, str]:
 @router.get("")
 def sessions(request: Request) -> list[dict[str, Any]]:
     """The caller's own sessions, those used latest first."""
-    return [asdict(one) for one in own_sessions(request)]
+    return [
+        {"id": one.id, "created": instant(one.created), "seen": instant(one.seen)}
+        for one in own_sessions(request)
+    ]
 
 
 @router.get("/{sid}")

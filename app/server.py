@@ -2,16 +2,21 @@
 with 0; told a second time, it ends at once.
 """
 
+import logging
 import os
 import socket
 import time
 from collections.abc import Callable
 from types import FrameType
+from typing import Any
 
 import uvicorn
 
+from .addresses import in_brackets
 from .draining import Draining
 from .notify import notify
+
+log = logging.getLogger(__name__)
 
 CUT_OFF_SECONDS = 1
 """How long what is still under way after its grace may take to notice that it is cut off."""
@@ -43,7 +48,13 @@ class Server(uvicorn.Server):
         """Listen, and tell the service manager."""
         await super().startup(sockets)
         if self.started:
+            _tell_of_start(self.config.app, sockets or [])
             notify("READY=1")
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """End what is under way, and the services."""
+        await super().shutdown(sockets)
+        log.info("ridetune has stopped")
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """The signal's handler. What is kept is whole at any time, so a hard end costs nothing but
@@ -65,3 +76,11 @@ class Server(uvicorn.Server):
         if passed < self._notice:
             return False
         return self._draining.under_way == 0 or passed >= self._notice + self._grace
+
+
+def _tell_of_start(app: Any, sockets: list[socket.socket]) -> None:
+    """One record with what an operator looks for first; how to get in is not for a log."""
+    listening = (one.getsockname() for one in sockets)
+    addresses = ", ".join(f"{in_brackets(host)}:{port}" for host, port, *_ in listening)
+    data = app.state.services.settings.data
+    log.info("ridetune %s serves %s with data in %s", app.version, addresses, data)

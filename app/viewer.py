@@ -26,7 +26,7 @@ from websockets.exceptions import ConnectionClosed, WebSocketException
 from ..engine.vehicle import Vehicle
 from .access import opened_session, session_of
 from .buckets import Buckets
-from .errors import Busy, NotFound, Unavailable
+from .errors import Busy, NotFound, Unavailable, UnknownKey
 from .limits import Limits
 from .package_files import package_folder
 from .viser_servers import ADMISSION, closed_server
@@ -199,6 +199,9 @@ async def relay(websocket: WebSocket, sid: str) -> None:
     except NotFound:
         await _hang_up(websocket, 1008)
         return
+    except UnknownKey as refused:
+        await _hang_up(websocket, 1008, str(refused))
+        return
     except (Busy, Unavailable) as refused:
         await _hang_up(websocket, 1013, str(refused))
         return
@@ -253,7 +256,7 @@ async def _pass_on(websocket: WebSocket, sid: str, address: str, limits: Limits)
 
 async def _until_lost(websocket: WebSocket, sid: str) -> None:
     """Hang up once the session is the caller's no more: deleted, or their key removed."""
-    with suppress(NotFound):
+    with suppress(NotFound, UnknownKey):
         while True:
             await asyncio.sleep(LOOK_AGAIN_SECONDS)
             # While nobody can tell, it stays theirs.

@@ -172,8 +172,14 @@ export const jobs = (kind) => json("GET", `${base}/${kind}`);
 export const job = (kind, id) => json("GET", `${base}/${kind}/${id}`);
 export const cancelJob = (kind, id) => json("POST", `${base}/${kind}/${id}/cancel`);
 
-/** Follow a job: onProgress(progress), onState(job). Returns a function that stops following. */
-export function follow(kind, id, onProgress, onState) {
+/** Whether the service answers at all. */
+export const answers = () => fetch("/healthz").then(() => true, () => false);
+
+/**
+ * Follow a job: onProgress(progress), onState(job), onLost() when the connection is. Returns a function
+ * that stops following.
+ */
+export function follow(kind, id, onProgress, onState, onLost) {
   const source = new EventSource(`${base}/${kind}/${id}/events`);
   source.addEventListener("progress", (event) => onProgress(JSON.parse(event.data)));
   source.addEventListener("state", (event) => {
@@ -183,12 +189,13 @@ export function follow(kind, id, onProgress, onState) {
   });
   // EventSource reconnects by itself; when the service refuses for good, one look tells the end.
   source.addEventListener("error", () => {
+    onLost();
     if (source.readyState !== EventSource.CLOSED) return;
     setTimeout(async () => {
       try {
         const found = await job(kind, id);
         onState(found);
-        if (!isFinal(found.state)) stop = follow(kind, id, onProgress, onState);
+        if (!isFinal(found.state)) stop = follow(kind, id, onProgress, onState, onLost);
       } catch (error) {
         if (error.lost || error.status >= 500) source.dispatchEvent(new Event("error"));
       }

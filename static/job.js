@@ -1,6 +1,7 @@
 // The newest job of one kind on the page: sent, followed to its end, cancelled, taken up again.
 
 import * as api from "./api.js";
+import { brokenOff } from "./connection.js";
 import { refused } from "./notices.js";
 import { on, set } from "./store.js";
 
@@ -65,7 +66,7 @@ export function jobs(kind, what, { changed, progressed = changed, ended }) {
       job = { ...job, ...state };
       if (!busy()) await read();
       changed();
-    });
+    }, brokenOff);
   }
 
   async function read() {

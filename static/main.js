@@ -36,6 +36,9 @@ const RETRY = 1500;
 const FIT_HEIGHT = 432;
 const STAGE_SHARE = [38, 54];
 
+/** Where the browser keeps, for a reload, which tab is open. */
+const TAB = "tab";
+
 const sid = location.pathname.split("/")[2];
 
 async function start() {
@@ -69,7 +72,9 @@ async function start() {
 }
 
 function build() {
+  const shown = sessionStorage.getItem(TAB);
   const select = tabs($("#workbench [role=tablist]"), (id) => {
+    sessionStorage.setItem(TAB, id);
     if (id === "tab-identification") identification.opened();
   });
   timeline.build();
@@ -97,6 +102,7 @@ function build() {
   scene.build(sid, { askForCar: () => want("scene") });
   splitter();
   help();
+  if (document.getElementById(shown)?.getAttribute("role") === "tab") select(shown);
 }
 
 /** What follows from a change. */

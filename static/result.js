@@ -70,8 +70,9 @@ function running(job) {
 }
 
 function outcome(job) {
-  if (job.state === "running") return `Fitting ${job.runs.map(({ id, name }) => nameOf(id) ?? name).join(", ")} …`;
   if (job.state === "queued") return queued(job);
+  if (job.state === "running" && begun(job)) return `Fitting ${job.runs.map(({ id, name }) => nameOf(id) ?? name).join(", ")} …`;
+  if (job.state === "running") return "Starting the fit …";
   if (!job.result) return STATES[job.state];
   return job.result.outcome;
 }
@@ -98,7 +99,10 @@ function toWarnings({ warnings }) {
   }, `${warnings.length} warning${warnings.length > 1 ? "s" : ""} below`);
 }
 
-/** Only numbers and the curve move while the fit runs. */
+/** Whether it has told how far it is. */
+const begun = ({ progress }) => Object.keys(progress ?? {}).length > 0;
+
+/** Only words, numbers and the curve move while the fit runs. */
 export function advance(job) {
   if (!job || !cost?.element.isConnected) return;
   const { progress } = job;
@@ -112,10 +116,10 @@ export function advance(job) {
       h("td", {}, units.number(value * row.display_factor)),
       h("td", { className: "unit" }, row.display_unit));
   }));
-  const before = ["queued", "running"].includes(job.state) ? "Not started yet." : "";
+  if (!job.result) $("#outcome").textContent = outcome(job);
   const stage = $("#stage-of-fit");
   if (stage) stage.textContent = stageOf(job);
-  $("#cost-now").textContent = last === undefined || last === null ? before
+  $("#cost-now").textContent = last === undefined || last === null ? ""
     : `${units.number(last, 4)} after ${counted(history.length, "step")}, ${counted(simulations, "simulation")}` +
       (job.result ? `, ${units.number(job.result.seconds, 2)} s` : "");
 }

@@ -1,5 +1,6 @@
 // The 3D view: viser in a frame of our own origin, posed through its bridge (bridge.js).
 
+import { brokenOff } from "./connection.js";
 import { $, capital, h } from "./dom.js";
 import { COLOURS } from "./plots.js";
 import { carMessages, farPivots, ghostMessages, pivotAt, update, visibility } from "./poses.js";
@@ -61,7 +62,10 @@ export function build(sid, { askForCar }) {
       seen.connected = detail.state === "connected";
       seen.connections += seen.connected;
       seen.built = false;
-      if (!seen.connected) note("The 3D view has lost its connection and is trying again.");
+      if (!seen.connected) {
+        note("The 3D view has lost its connection and is trying again.");
+        brokenOff();
+      }
     }
   });
   const query = new URLSearchParams(location.search).get("fixedDpr");

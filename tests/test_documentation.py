@@ -1,6 +1,7 @@
 """The documentation tells the truth: its example runs, its tables are the engine's."""
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -11,6 +12,8 @@ from ridetune.engine.channels import CHANNEL_KINDS
 from ridetune.engine.mapping.mapping import mapping_from_json
 from ridetune.engine.parameters import ALL_PARAMETERS, PARAMETERS
 from ridetune.engine.vehicle_file import vehicle_from_text
+
+from tests.app.live import LiveService
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -25,6 +28,34 @@ def test_readme_example_identifies_the_sample_car():
     assert "The fit converged" in done.stdout
     assert all(parameter.name in done.stdout for parameter in PARAMETERS)
     assert "chassis.z" in done.stdout.splitlines()[-1]
+
+
+def test_readme_requests_are_taken_as_they_stand_as_often_as_they_are_sent(tmp_path):
+    """But for the port and where things are. Oracle: the ends that jobs tell."""
+    beginning = r"^## REST\n\n[^\n]*\n\n"
+    [block] = re.findall(beginning + r"((?:    [^\n]*\n|\n(?=    ))+)", README, re.MULTILINE)
+    data = tmp_path / "data"
+    here = tmp_path / "here"
+    (here / ".venv").mkdir(parents=True)
+    (here / ".venv" / "bin").symlink_to(Path(sys.executable).parent)
+    (here / "sample_runs").symlink_to(ROOT / "sample_runs")
+    with LiveService(data) as service:
+        script = block.replace("http://127.0.0.1:8000", service.ready().address)
+        for _ in range(2):
+            done = subprocess.run(
+                ["bash", "-c", script],
+                cwd=here,
+                env={**os.environ, "RIDETUNE_DATA": str(data)},
+                capture_output=True,
+                text=True,
+            )
+            assert done.returncode == 0
+            assert len(re.findall('"state": ?"done"', done.stdout)) == 4, done.stdout
+            assert "about:blank" not in done.stdout, "nothing is refused"
+            assert "not found" not in done.stderr
+            for made in ("run.csv", "cars.parquet", "campaign.zip"):
+                assert (here / made).stat().st_size > 1000
+                (here / made).unlink()
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())

@@ -4,6 +4,7 @@ import re
 
 import pytest
 from fastapi.testclient import TestClient
+from ridetune.app import session_store
 from ridetune.app.addresses import networks
 from ridetune.app.limits import Limits
 from ridetune.app.settings import Settings
@@ -220,15 +221,49 @@ def test_a_removed_key_is_at_once_worth_nothing(client):
     rig = bearer(keys.add("rig"))
     sid = client.post("/api/sessions", headers=rig).json()["id"]
     keys.remove("rig")
-    assert client.get(f"/api/sessions/{sid}", headers=rig).status_code == 404
-    assert client.get("/api/sessions", headers=rig).json() == []
-    for reply in (
-        client.post("/api/sessions", headers=rig),
-        client.get("/api/parameters", headers=rig),
-    ):
-        assert reply.status_code == 403
+    assert client.get(f"/api/sessions/{sid}", headers=rig).status_code == 401
     renewed = bearer(keys.add("rig"))
     assert client.get(f"/api/sessions/{sid}", headers=renewed).status_code == 200
+
+
+@pytest.mark.parametrize("login", [True, False])
+def test_a_key_that_is_not_known_is_told_so_wherever_it_comes(settings, login):
+    """Oracle: RFC 9110, 15.5.2: 401, with a challenge. Without login it is a mistake as well."""
+    with open_client(settings, login=login) as client:
+        stranger = another(client, peer="192.0.2.7")
+        sid = stores(client).sessions.create({"name": "a car"}, [])[0]
+        for method, path in (
+            ("GET", "/"),
+            ("GET", f"/s/{sid}/"),
+            ("GET", f"/s/{sid}/viewer/"),
+            ("GET", "/metrics"),
+            ("GET", "/api/parameters"),
+            ("POST", "/api/roads/preview"),
+            ("GET", "/api/sessions"),
+            ("POST", "/api/sessions"),
+            ("GET", f"/api/sessions/{sid}"),
+            ("PUT", f"/api/sessions/{sid}/vehicle"),
+        ):
+            reply = stranger.request(
+                method, path, headers=bearer("rt_nonsense"), json={} if method != "GET" else None
+            )
+            assert (path, reply.status_code) == (path, 401)
+            assert reply.headers["www-authenticate"] == "Bearer"
+            assert reply.headers["content-type"] == "application/problem+json"
+            assert reply.json()["code"] == "unknown-key"
+            assert "ridetune keys add" in reply.json()["detail"]
+        assert client.get("/healthz", headers=bearer("rt_nonsense")).status_code == 200
+
+
+def test_other_tokens_may_begin_as_keys_do(tmp_path, monkeypatch):
+    """A session's is drawn of all letters, the service's is chosen."""
+    monkeypatch.setattr(session_store, "new_secret", lambda: "rt_drawn")
+    with open_client(Settings(data=tmp_path, token="rt_chosen"), login=True) as client:
+        sid, token = stores(client).sessions.create({"name": "a car"}, [])
+        mine = bearer(token)
+        assert client.get(f"/api/sessions/{sid}/vehicle", headers=mine).status_code == 200
+        assert [one["id"] for one in client.get("/api/sessions", headers=mine).json()] == [sid]
+        assert client.post("/api/sessions", headers=bearer("rt_chosen")).status_code == 201
 
 
 def test_a_key_in_the_address_lets_nobody_in(client):

@@ -93,7 +93,7 @@ def test_keys_come_and_go_beside_the_running_service(service, capsys):
     assert key not in row
     assert "rig 3" in run(capsys, "keys", "remove", "rig 3", *data)
     assert (
-        httpx2.post(f"{address}/api/sessions", headers=brought, timeout=PATIENCE).status_code == 403
+        httpx2.post(f"{address}/api/sessions", headers=brought, timeout=PATIENCE).status_code == 401
     )
 
 

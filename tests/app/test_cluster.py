@@ -185,6 +185,15 @@ def test_a_frozen_worker_does_not_keep_a_cluster_from_closing(tmp_path, heard):
             os.kill(process, signal.SIGCONT)
 
 
+def test_a_worker_that_ends_with_its_cluster_does_not_warn_of_its_task(tmp_path, heard, capfd):
+    """As Dask would; whoever closes the cluster knows."""
+    cluster = Cluster("", tmp_path, workers=1)
+    cluster.submit("deaf", tasks.ignore, None, heard)
+    heard.started.get(timeout=PATIENCE)
+    cluster.close()
+    assert "CancelledError" not in capfd.readouterr().err
+
+
 def test_a_task_that_waits_for_a_worker_is_cancelled_at_once(cluster, heard):
     for name in ("first", "second", "third"):
         cluster.submit(name, tasks.wait, None, heard)

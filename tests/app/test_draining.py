@@ -2,11 +2,16 @@
 
 import asyncio
 import json
+import os
+import re
 import signal
 import socket
+import subprocess
+import sys
 import time
 import urllib.error
 import urllib.request
+from importlib.metadata import version
 
 import pytest
 from ridetune.app.draining import Drain, Draining
@@ -166,6 +171,33 @@ def test_it_gives_notice_and_then_its_grace(under_way, goes):
         return before, draining.begun, found
 
     assert in_a_loop(lambda: at(10.0, 11.9, 16.9, 17.0)) == (False, True, goes)
+
+
+def test_the_log_tells_of_the_start_and_the_stop_once_each(tmp_path):
+    """What an operator looks for first, and nothing that lets anybody in."""
+    token = "open-sesame"
+    told = {"RIDETUNE_LOG": "json", "RIDETUNE_LOG_LEVEL": "INFO", "RIDETUNE_TOKEN": token}
+    program = "import sys; from ridetune.app.cli import main; sys.exit(main())"
+    with subprocess.Popen(
+        [sys.executable, "-c", program, "serve", "--port", "0", "--data", str(tmp_path)],
+        env={**os.environ, **told},
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as service:
+        assert service.stderr is not None
+        begin = json.loads(service.stderr.readline())
+        service.send_signal(signal.SIGTERM)
+        rest = service.stderr.read()
+        assert service.wait(PATIENCE) == 0
+    [end] = [json.loads(line) for line in rest.splitlines()]
+    assert re.fullmatch(
+        rf"ridetune {re.escape(version('ridetune'))} serves 127\.0\.0\.1:\d+ with data in "
+        + re.escape(str(tmp_path)),
+        begin["message"],
+    )
+    assert end["message"] == "ridetune has stopped"
+    assert begin["level"] == end["level"] == "INFO"
+    assert token not in f"{begin}{end}"
 
 
 def test_a_second_signal_ends_it_at_once(tmp_path):

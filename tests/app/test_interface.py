@@ -43,6 +43,12 @@ def test_every_refusal_is_described_as_problem_details(document, operations):
     assert "HTTPValidationError" not in document["components"]["schemas"]
 
 
+def test_a_key_that_is_not_known_is_a_refusal_of_every_route_of_the_interface(document, operations):
+    for _, path, operation in operations.values():
+        assert ("401" in operation["responses"]) == path.startswith("/api/")
+    assert "WWW-Authenticate" in document["components"]["responses"]["Problem401"]["headers"]
+
+
 def test_what_belongs_to_a_session_asks_for_its_token(operations):
     for _, path, operation in operations.values():
         assert ("/{sid}" in path) == (operation.get("security") == [{"session": []}])

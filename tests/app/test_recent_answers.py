@@ -135,7 +135,7 @@ def test_a_key_that_another_process_removes_is_worth_nothing_in_a_moment(tmp_pat
         KeyStore(beside).remove("rig")
         beside.close()
         clock.now = 1.0
-        assert [client.get(path, headers=rig).status_code for path in paths] == [403, 404]
+        assert [client.get(path, headers=rig).status_code for path in paths] == [401, 401]
 
 
 def test_a_car_is_not_kept_of_a_session_that_is_gone(tmp_path):

@@ -5,6 +5,8 @@ import sys
 
 import pytest
 from ridetune.app.settings import Settings
+from ridetune.app.tables import sessions
+from sqlalchemy import update
 
 from .conftest import Visitor, open_client
 
@@ -22,6 +24,20 @@ def test_a_fresh_session_holds_the_sample_project(visitor):
     driven = [kept["manoeuvre"]["name"] for kept in session["measurements"]]
     assert [name.partition(":")[0] for name in driven] == ["Manoeuvre 1", "Manoeuvre 2"]
     assert session["identifications"] == []
+
+
+def test_the_list_tells_when_a_session_was_made_and_used_last(visitor):
+    """In ISO 8601 as all instants of the interface. Oracle: 1.7e9 s of Unix time by `date -u`."""
+    with visitor.client.app.state.services.store.database.writing() as connection:
+        connection.execute(update(sessions).values(created=1_700_000_000.25, seen=1_700_000_060.0))
+    mine = {"Authorization": f"Bearer {visitor.token}"}
+    assert visitor.client.get("/api/sessions", headers=mine).json() == [
+        {
+            "id": visitor.id,
+            "created": "2023-11-14T22:13:20.250000+00:00",
+            "seen": "2023-11-14T22:14:20+00:00",
+        }
+    ]
 
 
 def test_a_first_session_does_not_wait_for_the_compiler():

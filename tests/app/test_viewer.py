@@ -99,11 +99,34 @@ def read_on(socket):
 
 
 def test_an_open_view_ends_with_the_session(client, visitor, monkeypatch):
-    """Whatever ends it: that it is deleted, or a key removed."""
     monkeypatch.setattr(viewer, "LOOK_AGAIN_SECONDS", 0.05)
     with open_socket(client, visitor) as socket:
         assert socket.receive_bytes()
         client.app.state.services.store.sessions.delete(visitor.id)
+        with pytest.raises(WebSocketDisconnect) as refused:
+            read_on(socket)
+    assert refused.value.code == 1008
+
+
+def test_a_key_that_is_not_known_opens_no_view_and_is_told_so(client, visitor):
+    with (
+        pytest.raises(WebSocketDisconnect) as refused,
+        open_socket(client, visitor, Authorization="Bearer rt_nonsense"),
+    ):
+        pass
+    assert refused.value.code == 1008
+    assert "ridetune keys add" in refused.value.reason
+
+
+def test_an_open_view_ends_with_its_key(client, monkeypatch):
+    monkeypatch.setattr(viewer, "LOOK_AGAIN_SECONDS", 0.05)
+    keys = client.app.state.services.store.keys
+    rig = {"Authorization": f"Bearer {keys.add('rig')}"}
+    sid = client.post("/api/sessions", headers=rig).json()["id"]
+    address = f"{SOCKETS}/s/{sid}/viewer"
+    with client.websocket_connect(address, subprotocols=[PROTOCOL], headers=rig) as socket:
+        assert socket.receive_bytes()
+        keys.remove("rig")
         with pytest.raises(WebSocketDisconnect) as refused:
             read_on(socket)
     assert refused.value.code == 1008

@@ -31,6 +31,23 @@ def test_a_fit_is_followed_again_after_the_service_could_not_answer(visitor):
     assert refused[0] == "events" != refused[1]
 
 
+def test_a_fit_that_has_just_begun_says_one_thing(visitor):
+    """Until it tells how far it is, neither a fit that goes on nor one that has not started."""
+
+    def begun(route):
+        reply = route.fetch()
+        told = reply.json() | {"state": "running", "progress": {}}
+        route.fulfill(response=reply, json=told)
+
+    visitor.page.route("**/identifications", begun)
+    visitor.page.route("**/events", lambda route: None)
+    visitor.click("#identify")
+    visitor.until("ridetune.job() !== null")
+    assert visitor.element("#outcome").inner_text() == "Starting the fit …"
+    assert visitor.element("#cost-now").inner_text() == ""
+    assert "not started" not in visitor.element("#identification").inner_text().lower()
+
+
 def test_a_newcomer_identifies_the_sample_car_and_applies_it(visitor):
     """Open, press Identify, apply: the charts move towards the measurement."""
     before, worse = visitor.line("chassis.pitch"), fit_of(visitor, "chassis.pitch")

@@ -385,3 +385,36 @@ def test_the_car_compared_with_is_never_another_than_the_legend_says(visitor):
     charts = visitor.element("#chart-area").inner_text()
     assert "Not simulated." in charts
     assert not re.search(r"\d", charts)
+
+
+def test_a_reload_comes_back_to_the_open_tab(visitor):
+    """A fit that is under way is followed where it was looked at; a new window begins anew."""
+    visitor.click("#tab-identification")
+    visitor.page.reload()
+    visitor.wait_until_drawn()
+    assert visitor.element("#identification").is_visible()
+    assert visitor.element("#tab-identification").get_attribute("aria-selected") == "true"
+    other = visitor.page.context.new_page()
+    other.goto(visitor.page.url)
+    assert not other.locator("#identification").is_visible()
+
+
+@pytest.mark.parametrize("lost", ["the events of a job", "the 3D view"])
+def test_the_page_says_at_once_that_the_service_is_away_and_when_it_is_back(visit, tmp_path, lost):
+    """Nobody has to move a slider; oracle: the service is killed, then started again."""
+    service = Service(tmp_path / "data")
+    try:
+        visitor = visit(in_3d=lost == "the 3D view").open(service.address)
+        visitor.expect(*AWAY)
+        if not visitor.in_3d:
+            visitor.click("#identify")
+            visitor.until("ridetune.job() !== null")
+        visitor.settled()
+        service.stop(signal.SIGKILL)
+        banner = visitor.element("#banner")
+        visitor.wait(banner.is_visible, "the page says that it is alone", 8)
+        assert "does not answer" in banner.inner_text()
+        service = Service(tmp_path / "data", service.port)
+        visitor.wait(lambda: not banner.is_visible(), "the page goes on")
+    finally:
+        service.stop()
