@@ -175,7 +175,7 @@ def test_it_gives_notice_and_then_its_grace(under_way, goes):
 
 def test_the_log_tells_of_the_start_and_the_stop_once_each(tmp_path):
     """What an operator looks for first, and nothing that lets anybody in."""
-    token = "open-sesame"
+    token = "open-sesame-of-the-forty"
     told = {"RIDETUNE_LOG": "json", "RIDETUNE_LOG_LEVEL": "INFO", "RIDETUNE_TOKEN": token}
     program = "import sys; from ridetune.app.cli import main; sys.exit(main())"
     with subprocess.Popen(
