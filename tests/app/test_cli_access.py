@@ -135,7 +135,7 @@ def test_behind_a_proxy_the_terminal_names_the_directory_and_the_page_does_not(t
         command = second.rpartition("for another: ")[2].split()
         assert command == ["ridetune", "link", "--data", str(tmp_path)]
         assert "https://ride.example/?token=" in run(capsys, *command[1:])
-        process.send_signal(signal.SIGINT)
+        process.terminate()  # SIGINT may be ignored until the service has started
         process.communicate(timeout=60)
     settings = Settings(data=tmp_path, public_url="https://ride.example")
     with open_client(settings, login=True) as visitor:

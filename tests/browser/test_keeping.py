@@ -78,7 +78,10 @@ def test_a_refused_part_is_told_and_holds_no_other_back(visitor):
     assert "give a lower bound below the upper one" in message.inner_text()
     visitor.page.get_by_role("spinbutton", name="Noise of z,").fill("0.7")
     change(visitor, "Upper bound of Rear spring stiffness", "40")
-    visitor.wait(lambda: len(kept(visitor)["bounds"]) == 2, "what is right is kept")
+    visitor.wait(
+        lambda: len(kept(visitor)["bounds"]) == 2 and kept(visitor)["noise"],
+        "what is right is kept",
+    )
     found = kept(visitor)
     assert found["bounds"] == {
         "front.suspension.stiffness": [30e3, None],
