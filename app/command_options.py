@@ -32,23 +32,15 @@ def link(command: Parser) -> None:
 
 
 def browsers(command: Parser) -> None:
-    actions = command.add_subparsers(metavar="list|remove", dest="action", required=True)
-    command.commands = actions.choices
-    shown = actions.add_parser("list", help="show which browsers are let in")
-    remove = actions.add_parser("remove", help="end browsers")
-    remove.add_argument("ids", metavar="ID", nargs="+", help="as the list shows it")
-    for action in (shown, remove):
-        _add_data(action)
+    _add_list_and_remove(command, "show which browsers are let in", "end browsers")
 
 
 def sessions(command: Parser) -> None:
-    actions = command.add_subparsers(metavar="list|remove", dest="action", required=True)
-    command.commands = actions.choices
-    shown = actions.add_parser("list", help="show whose each session is, and what it holds")
-    remove = actions.add_parser("remove", help="delete sessions with all they hold")
-    remove.add_argument("ids", metavar="ID", nargs="+", help="as the list shows it")
-    for action in (shown, remove):
-        _add_data(action)
+    _add_list_and_remove(
+        command,
+        "show whose each session is, and what it holds",
+        "delete sessions with all they hold",
+    )
 
 
 def keys(command: Parser) -> None:
@@ -341,6 +333,17 @@ def _add_step(command: Parser, untold: str) -> None:
     command.add_argument(
         "--step", metavar="S", type=float, help=f"longest integration step, s; {untold}"
     )
+
+
+def _add_list_and_remove(command: Parser, listed: str, removed: str) -> None:
+    """Two actions; `listed` and `removed` say what they do."""
+    actions = command.add_subparsers(metavar="list|remove", dest="action", required=True)
+    command.commands = actions.choices
+    shown = actions.add_parser("list", help=listed)
+    remove = actions.add_parser("remove", help=removed)
+    remove.add_argument("ids", metavar="ID", nargs="+", help="as the list shows it")
+    for action in (shown, remove):
+        _add_data(action)
 
 
 def _add_noise(command: Parser, what: str) -> None:
