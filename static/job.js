@@ -7,8 +7,8 @@ import { on, set } from "./store.js";
 
 const LOOK = 5000; // ms between two looks at why a job waits
 
-/** What is said of a job that waits: the service's reason, where workers are out of its reach. */
-export const queued = (job) => job.reason ?? "Waiting for a worker …";
+/** What is said of a job that waits: the service's reason, as long as workers are out of its reach. */
+export const queued = ({ state, reason }) => (state === "queued" && reason) || "Waiting for a worker …";
 
 /**
  * Jobs of a kind ("identifications", "profiles", "validations", "campaigns"), called `what` to a person.
