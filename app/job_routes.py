@@ -90,7 +90,8 @@ def job_router(name: str, view: View) -> APIRouter:
         return job_to_json(known, view, with_result=True)
 
     async def watching(sid: SessionId, services: Shared) -> AsyncIterator[None]:
-        with services.jobs.watching(sid, services.settings.limits.session_events):
+        # For each the database is asked every second whether it may.
+        with services.event_streams.one_more(sid):
             yield
 
     @router.get(

@@ -6,15 +6,14 @@ process that runs it, and in the database once a second.
 """
 
 import asyncio
-from collections import Counter
-from collections.abc import AsyncIterator, Callable, Iterator, Mapping
-from contextlib import aclosing, contextmanager
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import aclosing
 from dataclasses import replace
 from typing import Any
 
 from .cluster import Cluster
 from .dispatcher import Dispatcher
-from .errors import Busy, NotFound, Unavailable
+from .errors import NotFound, Unavailable
 from .followers import Followers
 from .job_kinds import Kind
 from .job_row import Job
@@ -37,7 +36,6 @@ class Jobs:
         self._store = store
         self._kinds = kinds
         self._followers = Followers(store.jobs)
-        self._watching: Counter[str] = Counter()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._dispatcher = Dispatcher(store, cluster, kinds, self._wake, ready, taking)
 
@@ -90,25 +88,6 @@ class Jobs:
         """Stop every job of a session that is about to go."""
         for job in self._store.jobs.unfinished(session):
             self._stop(job)
-
-    @contextmanager
-    def watching(self, session: str, most: int) -> Iterator[None]:
-        """Count who follows a job of a session; for the event loop. For each the database is asked
-        every second whether it may.
-        """
-        if self._watching[session] >= most:
-            raise Busy(
-                f"The session's jobs are followed {most} times already; close one of its pages, or "
-                "ask for the job itself now and then.",
-                retry_after=5,
-            )
-        self._watching[session] += 1
-        try:
-            yield
-        finally:
-            self._watching[session] -= 1
-            if not self._watching[session]:
-                del self._watching[session]
 
     async def follow(
         self, session: str, job: str, require: Callable[[], object] = lambda: None

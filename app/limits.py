@@ -35,14 +35,15 @@ class Limits:
     session_jobs: int = 200
     unfinished_jobs: int = 4
     session_events: int = 40
+    session_streams: int = 8
     session_simulations: int = 4
     waiting_simulations: int = 64
     session_simulated_seconds: float = 200_000.0
     user_simulated_seconds: float = 1_000_000.0
     viewers: int = 200
     session_viewers: int = 8
-    viewer_messages: int = 200
-    viewer_message_bytes: int = 256_000
+    tab_messages: int = 200
+    tab_message_bytes: int = 256_000
     readers: int = 2
     session_readings: int = 16
     waiting_readings: int = 64

@@ -29,6 +29,7 @@ from . import (
     routes_simulations,
     routes_sweeps,
     routes_validations,
+    simulation_stream,
 )
 from .callers import Callers
 from .campaign_job import KIND as CAMPAIGN
@@ -55,6 +56,7 @@ from .recordings import Recordings
 from .services import Services, Viewers
 from .services_metrics import ServicesCollector
 from .settings import Settings
+from .shares import Shares
 from .simulators import Simulators
 from .store import Store
 from .sweep_job import KIND as SWEEP
@@ -123,6 +125,7 @@ def create_app(
     for part in (
         routes_health,
         routes_simulations,
+        simulation_stream,
         routes_sessions,
         routes_catalogue,
         routes_measurements,
@@ -200,6 +203,15 @@ def _services(
         ),
         metrics=metrics,
         callers=Callers(settings.limits),
+        event_streams=Shares(
+            settings.limits.session_events,
+            "The session's jobs are followed {} times already; close one of its pages, or ask for "
+            "the job itself now and then.",
+        ),
+        simulation_streams=Shares(
+            settings.limits.session_streams,
+            "The session has {} streams of simulations open; close one of its pages.",
+        ),
         viewers=_viewers(settings.limits),
     )
 

@@ -58,52 +58,63 @@ def problem(
     return JSONResponse(body, status, headers=headers, media_type=MEDIA_TYPE)
 
 
-def reply_to(error: RideError) -> JSONResponse:
-    """Problem details of an error that the caller can mend."""
-    if isinstance(error, ServiceError):
-        return problem(
-            error.status, error.code, str(error), field=error.field, headers=error.headers
-        )
-    return problem(422, error.code, str(error))
+def reply_to(error: Exception) -> JSONResponse:
+    """Problem details of an error that a person can mend; any other is raised again."""
+    match error:
+        case ServiceError():
+            return problem(
+                error.status, error.code, str(error), field=error.field, headers=error.headers
+            )
+        case RideError():
+            return problem(422, error.code, str(error))
+        case OSError():
+            return _reply_to_disk(error)
+        case RequestValidationError():
+            return _reply_to_form(error)
+        case HTTPException():
+            return _reply_to_http(error)
+    raise error
 
 
 def reply_to_errors(app: FastAPI) -> None:
     """Answer every error of every route with problem details."""
+    for kind in (RideError, OSError, RequestValidationError, HTTPException):
+        app.add_exception_handler(kind, _handler)
 
-    @app.exception_handler(RideError)
-    async def ride_error(_: Request, error: RideError) -> JSONResponse:
-        return reply_to(error)
 
-    @app.exception_handler(OSError)
-    async def disk_error(_: Request, error: OSError) -> JSONResponse:
-        if (trouble := trouble_of(error)) is None:
-            raise error
-        log.error("%s: %s", trouble, error.strerror)
-        return reply_to(trouble)
+async def _handler(_: Request, error: Exception) -> JSONResponse:
+    return reply_to(error)
 
-    @app.exception_handler(RequestValidationError)
-    async def invalid_request(_: Request, error: RequestValidationError) -> JSONResponse:
-        if isinstance(error.body, bytes):
-            return problem(
-                415,
-                "unsupported-media-type",
-                "The body is not sent as JSON; send it with Content-Type: application/json.",
-            )
-        field, detail = _first_complaint(error)
-        return problem(422, InvalidRequest.code, detail, field=field)
 
-    @app.exception_handler(HTTPException)
-    async def http_error(_: Request, error: HTTPException) -> JSONResponse:
-        code = CODES.get(error.status_code, "http")
-        detail = str(error.detail).rstrip(".") + "."
-        if error.status_code == 404:
-            detail = "There is nothing at this address; see /api/openapi.json for what there is."
-        headers = dict(error.headers or {})
-        if error.status_code == 405:
-            detail = "This address does not take that method; see /api/openapi.json."
-            if headers.get("Allow") == "GET":
-                headers["Allow"] = "GET, HEAD"  # see heads.py
-        return problem(error.status_code, code, detail, headers=headers)
+def _reply_to_disk(error: OSError) -> JSONResponse:
+    if (trouble := trouble_of(error)) is None:
+        raise error
+    log.error("%s: %s", trouble, error.strerror)
+    return reply_to(trouble)
+
+
+def _reply_to_form(error: RequestValidationError) -> JSONResponse:
+    if isinstance(error.body, bytes):
+        return problem(
+            415,
+            "unsupported-media-type",
+            "The body is not sent as JSON; send it with Content-Type: application/json.",
+        )
+    field, detail = _first_complaint(error)
+    return problem(422, InvalidRequest.code, detail, field=field)
+
+
+def _reply_to_http(error: HTTPException) -> JSONResponse:
+    code = CODES.get(error.status_code, "http")
+    detail = str(error.detail).rstrip(".") + "."
+    if error.status_code == 404:
+        detail = "There is nothing at this address; see /api/openapi.json for what there is."
+    headers = dict(error.headers or {})
+    if error.status_code == 405:
+        detail = "This address does not take that method; see /api/openapi.json."
+        if headers.get("Allow") == "GET":
+            headers["Allow"] = "GET, HEAD"  # see heads.py
+    return problem(error.status_code, code, detail, headers=headers)
 
 
 class Unexpected:

@@ -35,21 +35,29 @@ def described(forms: Mapping[str, frames.Form]) -> dict[int | str, dict[str, Any
 async def simulate(
     sid: SessionId, services: Shared, body: SimulationRequest, request: Request
 ) -> Response:
-    """Simulate a manoeuvre, a recording's wheel motion or a rig test."""
+    """Simulate a manoeuvre, a recording's wheel motion or a rig test. A websocket at the same
+    address takes such bodies as messages, and of those that wait the newest alone.
+    """
     form = frames.form_of(request.headers.get("accept"))
     user = user_who_opened(request)
-    return await services.interactive.run(sid, lambda: _simulated(services, sid, user, body, form))
+    found = await services.interactive.run(sid, lambda: content_of(services, sid, user, body, form))
+    if isinstance(found, bytes):
+        return Response(found, media_type=frames.MEDIA_TYPE_OF[form])
+    return csv_reply(found)
 
 
-def _simulated(
+def content_of(
     services: Services, sid: str, user: str | None, body: SimulationRequest, form: frames.Form
-) -> Response:
+) -> Any:
+    """What a request's simulation finds: bytes, for CSV the run; on a thread of the pool for
+    interactive work.
+    """
     mode_of(body)
     fit = None
     if body.bands is not None:
         fit = done(services.jobs.get(sid, body.bands.identification, IDENTIFICATION))
     store = services.store
-    content, shown = services.in_simulator(
+    found, shown = services.in_simulator(
         sid,
         simulated,
         body,
@@ -62,9 +70,7 @@ def _simulated(
     )
     if shown is not None and services.viewers is not None:
         services.viewers.show(sid, shown)
-    if isinstance(content, bytes):
-        return Response(content, media_type=frames.MEDIA_TYPE_OF[form])
-    return csv_reply(content)
+    return found
 
 
 def frames_reply(head: dict[str, Any], taken: frames.Frames, form: frames.Form) -> Response:

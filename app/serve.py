@@ -38,7 +38,7 @@ def serve(settings: Settings) -> None:
             app,
             http=http,
             ws=websocket,
-            ws_max_size=settings.limits.viewer_message_bytes,
+            ws_max_size=settings.limits.tab_message_bytes,
             log_config=None,
             log_level="warning",
             access_log=False,

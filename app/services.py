@@ -17,6 +17,7 @@ from .pool import Pool
 from .readiness import Readiness
 from .recordings import Recordings
 from .settings import Settings
+from .shares import Shares
 from .simulators import Simulators
 from .store import Store
 from .warmup import WarmUp
@@ -50,6 +51,7 @@ class Services:
 
     interactive : for what a person waits for and takes a core, in one of the simulators
     readers : for what opens files in children
+    event_streams, simulation_streams : of jobs, and of what a slider asks for, open at the moment
     """
 
     settings: Settings
@@ -65,6 +67,8 @@ class Services:
     readiness: Readiness
     metrics: Metrics
     callers: Callers
+    event_streams: Shares
+    simulation_streams: Shares
     viewers: Viewers | None = None
 
     def in_simulator(

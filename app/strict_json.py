@@ -58,17 +58,22 @@ class StrictRequest(Request):
 
     async def json(self) -> Any:
         """Parsed body; HTTP 400 with a sentence for one that cannot be read."""
-        try:
-            body = await self.body()
-            if len(body) <= AT_ONCE:
-                return loads(body)
-            return await run_in_threadpool(loads, body)
-        except json.JSONDecodeError as error:
-            raise HTTPException(400, _not_json(error)) from None
-        except RecursionError:
-            raise HTTPException(400, _TOO_DEEP) from None
-        except ValueError as error:
-            raise HTTPException(400, str(error)) from None
+        body = await self.body()
+        if len(body) <= AT_ONCE:
+            return read(body)
+        return await run_in_threadpool(read, body)
+
+
+def read(body: bytes) -> Any:
+    """Value of a body; HTTP 400 with a sentence for one that cannot be read."""
+    try:
+        return loads(body)
+    except json.JSONDecodeError as error:
+        raise HTTPException(400, _not_json(error)) from None
+    except RecursionError:
+        raise HTTPException(400, _TOO_DEEP) from None
+    except ValueError as error:
+        raise HTTPException(400, str(error)) from None
 
 
 def loads(body: bytes) -> Any:

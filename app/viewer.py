@@ -7,7 +7,6 @@ nobody gets at a car without its session.
 viser is imported with the first view: it takes longer to load than the rest of the service.
 """
 
-import asyncio
 import ctypes
 import threading
 import time
@@ -19,26 +18,22 @@ from pathlib import Path
 from fastapi import APIRouter, Depends
 from fastapi.responses import HTMLResponse
 from starlette.concurrency import run_in_threadpool
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, WebSocketException
 
 from ..engine.vehicle import Vehicle
-from .access import opened_session, session_of
-from .buckets import Buckets
-from .errors import Busy, NotFound, Unavailable, UnknownKey
+from .access import opened_session
+from .errors import Busy, Unavailable
 from .limits import Limits
 from .package_files import package_folder
+from .sockets import LATER, hang_up, hanging_up, let_in, messages, while_theirs
 from .viser_servers import ADMISSION, closed_server
 
 FOG = (18, 22, 27)
 GROUND = (120, 124, 130)
 """Colour of the light from below."""
 MESSAGE_BYTES = 64 << 20
-BURST_SECONDS = 5
-"""How long a browser may send as fast as it can, in what it may send a second."""
-LOOK_AGAIN_SECONDS = 10.0
-"""How often it is looked at anew whether an open view is still its viewer's."""
 EYE, TARGET = (3.3, -4.1, 1.45), (0.0, 0.0, 0.5)
 
 router = APIRouter()
@@ -193,84 +188,45 @@ def page() -> HTMLResponse:
 @router.websocket("/s/{sid}/viewer")
 async def relay(websocket: WebSocket, sid: str) -> None:
     viewers: Viewers = websocket.app.state.services.viewers
-    try:
-        await run_in_threadpool(session_of, websocket, sid)
+    async with hanging_up(websocket):
+        await let_in(websocket, sid)
         viewer = await run_in_threadpool(viewers.watch, sid, 1)
-    except NotFound:
-        await _hang_up(websocket, 1008)
-        return
-    except UnknownKey as refused:
-        await _hang_up(websocket, 1008, str(refused))
-        return
-    except (Busy, Unavailable) as refused:
-        await _hang_up(websocket, 1013, str(refused))
-        return
-    try:
-        await _pass_on(websocket, sid, viewer.address, viewers.limits)
-    except Busy as flooded:
-        await _hang_up(websocket, 1008, str(flooded))
-    except (OSError, WebSocketException):
-        await _hang_up(websocket, 1013, "The 3D view is restarting.")
-    finally:
-        viewer.watchers -= 1
-        viewer.seen = time.monotonic()
-
-
-async def _hang_up(websocket: WebSocket, code: int, reason: str = "") -> None:
-    """Tell a tab why it gets nothing more; one that is gone meanwhile need not be told."""
-    with suppress(OSError, WebSocketDisconnect):
-        await websocket.close(code, reason)
+        try:
+            await _pass_on(websocket, sid, viewer.address, viewers.limits)
+        finally:
+            viewer.watchers -= 1
+            viewer.seen = time.monotonic()
 
 
 async def _pass_on(websocket: WebSocket, sid: str, address: str, limits: Limits) -> None:
     """Carry messages both ways until either side hangs up, the session is theirs no more, or the
     browser sends too many.
     """
-    rate = limits.viewer_messages
-    messages = Buckets(rate, BURST_SECONDS * rate)
     offered = [p for p in websocket.scope["subprotocols"] if p.startswith("viser-v")][:1]
-    async with connect(
-        address,
-        additional_headers=ADMISSION,
-        subprotocols=offered or None,
-        compression=None,
-        max_size=MESSAGE_BYTES,
-        ping_interval=None,
-        proxy=None,
-    ) as upstream:
-        await websocket.accept(subprotocol=upstream.subprotocol)
-        ways = [
-            asyncio.create_task(_to_viser(websocket, upstream, messages)),
-            asyncio.create_task(_to_browser(websocket, upstream)),
-            asyncio.create_task(_until_lost(websocket, sid)),
-        ]
-        try:
-            await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            for way in ways:
-                way.cancel()
-            ends = await asyncio.gather(*ways, return_exceptions=True)
-        if isinstance(ends[0], Busy):
-            raise ends[0]
+    try:
+        async with connect(
+            address,
+            additional_headers=ADMISSION,
+            subprotocols=offered or None,
+            compression=None,
+            max_size=MESSAGE_BYTES,
+            ping_interval=None,
+            proxy=None,
+        ) as upstream:
+            await websocket.accept(subprotocol=upstream.subprotocol)
+            await while_theirs(
+                websocket,
+                sid,
+                _to_viser(websocket, upstream, limits),
+                _to_browser(websocket, upstream),
+            )
+    except (OSError, WebSocketException):
+        await hang_up(websocket, LATER, "The 3D view is restarting.")
 
 
-async def _until_lost(websocket: WebSocket, sid: str) -> None:
-    """Hang up once the session is the caller's no more: deleted, or their key removed."""
-    with suppress(NotFound, UnknownKey):
-        while True:
-            await asyncio.sleep(LOOK_AGAIN_SECONDS)
-            # While nobody can tell, it stays theirs.
-            with suppress(Unavailable):
-                await run_in_threadpool(session_of, websocket, sid)
-    await _hang_up(websocket, 1008)
-
-
-async def _to_viser(websocket: WebSocket, upstream: ClientConnection, messages: Buckets) -> None:
-    while (message := await websocket.receive())["type"] != "websocket.disconnect":
-        if messages.take("browser"):
-            raise Busy("The 3D view sends too many messages; load the page again.")
-        data = message.get("bytes")
-        await upstream.send(message["text"] if data is None else data)
+async def _to_viser(websocket: WebSocket, upstream: ClientConnection, limits: Limits) -> None:
+    async for message in messages(websocket, limits):
+        await upstream.send(message)
 
 
 async def _to_browser(websocket: WebSocket, upstream: ClientConnection) -> None:

@@ -71,7 +71,7 @@ def test_nobody_follows_a_job_whose_head_was_asked_for(service, owner, clusters)
         assert told.status_code == 200
         assert told.headers["content-type"].startswith("text/event-stream")
     assert service.app.state.draining.under_way == 0
-    assert not service.app.state.services.jobs._watching
+    assert service.app.state.services.event_streams.of(owner.id) == 0
 
 
 def test_a_head_opens_no_session_and_uses_no_link_up(settings):

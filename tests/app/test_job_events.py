@@ -121,23 +121,23 @@ def test_a_sessions_jobs_are_followed_so_often_at_once(service, owner, clusters,
     """For each the database is asked every second, at the cost of all; it counts to its end."""
     job = submit(owner)["id"]
     owner.post(f"/identifications/{job}/cancel")
-    jobs, most = service.app.state.services.jobs, Limits().session_events
+    jobs, shares = service.app.state.services.jobs, service.app.state.services.event_streams
     usual, during = jobs.follow, []
 
     def follow(*told):
-        during.append(dict(jobs._watching))
+        during.append(shares.of(owner.id))
         return usual(*told)
 
     monkeypatch.setattr(jobs, "follow", follow)
     with ExitStack() as others:
-        for _ in range(most):
-            others.enter_context(jobs.watching(owner.id, most))
+        for _ in range(Limits().session_events):
+            others.enter_context(shares.one_more(owner.id))
         refused = owner.get(f"/identifications/{job}/events")
         assert refused.status_code == 429
         assert int(refused.headers["retry-after"]) > 0
     assert len(events(owner, job)) == 1
-    assert during == [{owner.id: 1}]
-    assert not jobs._watching
+    assert during == [1]
+    assert shares.of(owner.id) == 0
 
 
 def test_followers_wait_for_a_database_that_is_away(service, owner, clusters, monkeypatch):

@@ -192,18 +192,17 @@ def test_nothing_is_made_of_what_is_anothers(world, mine):
         assert mine.get(f"/{kind}").json() == []
 
 
-def test_pages_and_3d_views_of_anothers_are_not_there(client, world):
+def test_pages_and_websockets_of_anothers_are_not_there(client, world):
     for who, (visitor, headers) in strangers(client, world).items():
         for path in ("/", "/viewer/"):
             page = visitor.get(f"/s/{world.owner.id}{path}", headers=headers)
             assert (who, page.status_code) == (who, 404)
             assert PAPER["name"] not in page.text
-        with (
-            pytest.raises(WebSocketDisconnect) as refused,
-            visitor.websocket_connect(
-                f"/s/{world.owner.id}/viewer", headers={"Origin": ADDRESS, **headers}
-            ),
-        ):
-            pass
-        assert refused.value.code == 1008
+        for path in (f"/s/{world.owner.id}/viewer", f"/api/sessions/{world.owner.id}/simulations"):
+            with (
+                pytest.raises(WebSocketDisconnect) as refused,
+                visitor.websocket_connect(path, headers={"Origin": ADDRESS, **headers}),
+            ):
+                pass
+            assert refused.value.code == 1008
     assert world.owner.id not in client.app.state.services.viewers._viewers

@@ -5,7 +5,7 @@ import time
 import httpx2
 import msgspec
 import pytest
-from ridetune.app import viewer
+from ridetune.app import sockets
 from ridetune.app.errors import Busy, Unavailable
 from ridetune.app.limits import Limits
 from ridetune.app.viewer import Viewers, relay
@@ -99,7 +99,7 @@ def read_on(socket):
 
 
 def test_an_open_view_ends_with_the_session(client, visitor, monkeypatch):
-    monkeypatch.setattr(viewer, "LOOK_AGAIN_SECONDS", 0.05)
+    monkeypatch.setattr(sockets, "LOOK_AGAIN_SECONDS", 0.05)
     with open_socket(client, visitor) as socket:
         assert socket.receive_bytes()
         client.app.state.services.store.sessions.delete(visitor.id)
@@ -119,7 +119,7 @@ def test_a_key_that_is_not_known_opens_no_view_and_is_told_so(client, visitor):
 
 
 def test_an_open_view_ends_with_its_key(client, monkeypatch):
-    monkeypatch.setattr(viewer, "LOOK_AGAIN_SECONDS", 0.05)
+    monkeypatch.setattr(sockets, "LOOK_AGAIN_SECONDS", 0.05)
     keys = client.app.state.services.store.keys
     rig = {"Authorization": f"Bearer {keys.add('rig')}"}
     sid = client.post("/api/sessions", headers=rig).json()["id"]
@@ -133,8 +133,8 @@ def test_an_open_view_ends_with_its_key(client, monkeypatch):
 
 
 def test_an_open_view_outlasts_a_database_that_is_away(client, visitor, monkeypatch):
-    monkeypatch.setattr(viewer, "LOOK_AGAIN_SECONDS", 0.01)
-    usual, looks = viewer.session_of, []
+    monkeypatch.setattr(sockets, "LOOK_AGAIN_SECONDS", 0.01)
+    usual, looks = sockets.session_of, []
 
     def away(*told):
         looks.append(told)
@@ -142,7 +142,7 @@ def test_an_open_view_outlasts_a_database_that_is_away(client, visitor, monkeypa
             raise Unavailable("It is away.")
         return usual(*told)
 
-    monkeypatch.setattr(viewer, "session_of", away)
+    monkeypatch.setattr(sockets, "session_of", away)
     with open_socket(client, visitor) as socket:
         deadline = time.monotonic() + 20
         while len(looks) < 6:
@@ -158,7 +158,7 @@ def test_a_view_of_a_database_that_is_away_is_put_off(client, visitor, monkeypat
     def away(*_):
         raise Unavailable("It is away.")
 
-    monkeypatch.setattr(viewer, "session_of", away)
+    monkeypatch.setattr(sockets, "session_of", away)
     with pytest.raises(WebSocketDisconnect) as refused, open_socket(client, visitor):
         pass
     assert refused.value.code == 1013
@@ -282,7 +282,7 @@ def test_a_tab_too_many_is_told_so(client, visitor):
 def test_a_browser_that_floods_is_hung_up_on(client, visitor):
     """One message a second leaves room for five at once."""
     harmless = msgspec.msgpack.encode(messages.GuiCloseModalMessage("none").as_serializable_dict())
-    client.app.state.services.viewers.limits = Limits(viewer_messages=1)
+    client.app.state.services.viewers.limits = Limits(tab_messages=1)
     with open_socket(client, visitor) as socket:
         for _ in range(6):
             socket.send_bytes(harmless)
