@@ -116,6 +116,9 @@ export const changeSetup = (changes, leaving = false) =>
 export const saveBaseline = (vehicle) => json("PUT", `${base}/baseline`, { body: vehicle });
 export const simulate = (body) =>
   frames("POST", `${base}/simulations`, { body, accept: FRAMES });
+/** A websocket on which each message is a body of `simulate`. */
+export const simulations = () =>
+  new WebSocket(`${location.origin.replace(/^http/, "ws")}${base}/simulations`);
 /** Which manoeuvre to drive next, for {identification}. */
 export const advise = (body) => json("POST", `${base}/advice`, { body });
 export async function simulateFile(body) {

@@ -1,4 +1,7 @@
-// Simulations of the page: one in flight, the newest wish next; nothing queues up behind a slider.
+// Simulations of the page: nothing queues up behind a slider.
+//
+// While a run of "now" is under way, newer values are sent after it all the time, of which the
+// service takes the newest (stream.js): what it simulates is what the slider says by then.
 
 import * as api from "./api.js";
 import { allChannels, visibleChannels } from "./charts.js";
@@ -6,29 +9,38 @@ import { withValues } from "./controls.js";
 import { POSE_CHANNELS } from "./poses.js";
 import { rimsOf } from "./preparation.js";
 import { get, set } from "./store.js";
+import * as stream from "./stream.js";
 
 const MOST_SAMPLES = 2001;
 const MEASURED_SAMPLES = 4001;
+/** Milliseconds from a run of "now" that is under way to the next. */
+const PACE = 25;
+const BUSY = 500;
 
 const wanted = { now: false, reference: false, measured: false, scene: false };
-let running = false;
+const underWay = { now: 0, reference: 0, alone: 0 };
 let sequence = 0;
-/** Milliseconds from the newest wish to its charts, for the status line and the tests. */
+/** When a run of "now" was asked for last, and what asks for the next. */
+let sent = -Infinity;
+let timer = null;
+/** Milliseconds from a wish to its charts, for the status line and the tests. */
 export const timing = { asked: 0, shown: [] };
 
 /** Nothing is under way and nothing is wanted. */
-export const idle = () => !running;
+export const idle = () => !someUnderWay() && !timer;
+
+const someUnderWay = () => underWay.now + underWay.reference + underWay.alone > 0;
 
 /** Resolves once no request is under way that began before the last change. */
 export async function settled() {
-  while (running) await new Promise((done) => setTimeout(done, 30));
+  while (!idle()) await new Promise((done) => setTimeout(done, 30));
 }
 
 /** Ask for runs: "now", "reference", "measured"; `scene` also sends the car's nodes. */
 export function want(...names) {
   if (names.includes("now") && !wanted.now) timing.asked = performance.now();
   names.forEach((name) => { wanted[name] = true; });
-  if (!running) loop();
+  begin();
 }
 
 /** A car on the chosen ride, as much of it as the page shows. */
@@ -53,25 +65,55 @@ export function ofRide(car) {
   return body;
 }
 
-async function loop() {
-  running = true;
-  while (get("ready") && get("online") && Object.values(wanted).some(Boolean)) {
-    try {
-      if (wanted.measured) await measured();
-      else if (wanted.now || wanted.scene) await now();
-      else if (wanted.reference) await reference();
-    } catch (error) {
-      if (!(error instanceof api.Refusal)) {
-        running = false;
-        throw error;
-      }
-      if (error.lost) set({ online: false });
-      else if (error.code === "compiling") set({ ready: false });
-      else if (error.code === "busy") await new Promise((done) => setTimeout(done, 500));
-      else set({ trouble: error });
-    }
+/** Begin whatever is wanted and may begin by now. */
+function begin() {
+  for (;;) {
+    const next = get("ready") && get("online") ? following() : null;
+    if (!next) return;
+    perform(...next);
   }
-  running = false;
+}
+
+/** What may begin, as [kind, work], or null. */
+function following() {
+  if (underWay.alone) return null;
+  if (wanted.measured || wanted.scene) {
+    return someUnderWay() ? null : ["alone", wanted.measured ? measured : now];
+  }
+  if (wanted.now && mayHurry()) return ["now", now];
+  return wanted.reference && !underWay.reference ? ["reference", reference] : null;
+}
+
+/** Whether one more run of "now" may begin; if it may after a while, it does. */
+function mayHurry() {
+  if (!underWay.now) return true;
+  if (!stream.open()) return false;
+  const early = sent + PACE - performance.now();
+  if (early > 0) {
+    timer ??= setTimeout(() => {
+      timer = null;
+      begin();
+    }, early);
+  }
+  return early <= 0;
+}
+
+async function perform(kind, work) {
+  underWay[kind] += 1;
+  try {
+    await work();
+  } catch (error) {
+    if (!(error instanceof api.Refusal)) {
+      underWay[kind] -= 1;
+      throw error;
+    }
+    if (error.lost) set({ online: false });
+    else if (error.code === "compiling") set({ ready: false });
+    else if (error.code === "busy") await new Promise((done) => setTimeout(done, BUSY));
+    else set({ trouble: error });
+  }
+  underWay[kind] -= 1;
+  begin();
 }
 
 async function measured() {
@@ -94,9 +136,11 @@ async function now() {
   const scene = wanted.scene;
   const asked = timing.asked;
   wanted.now = wanted.scene = false;
-  const run = await retried(scene ? "scene" : "now", () => api.simulate(request({ vehicle, values, scene })))
+  sent = performance.now();
+  const body = request({ vehicle, values, scene });
+  const run = await retried(...(scene ? ["scene", () => api.simulate(body)] : ["now", () => stream.simulate(body)]))
     .catch((error) => { throw Object.assign(error, { values }); });
-  if (!isStill()) return;
+  if (!run || !isStill()) return;
   set({ trouble: null, now: run, valuesNow: values, vehicleNow: withValues(vehicle, values) });
   timing.shown.push(performance.now() - asked);
   if (timing.shown.length > 500) timing.shown.shift();

@@ -47,18 +47,21 @@ def test_two_people_get_in_and_not_at_each_others_cars(visit, asking):
     sid = hers.split("/")[4]
     guessed = bert.page.evaluate(
         """async (sid) => {
-            const socket = new WebSocket(`ws://${location.host}/s/${sid}/viewer`, ["viser-v1.1.1"]);
-            const opened = new Promise((done) => {
+            const opened = ([path, ...protocols]) => new Promise((done) => {
+                const socket = new WebSocket(`ws://${location.host}${path}`, protocols);
                 socket.onopen = () => done(true);
                 socket.onclose = () => done(false);
             });
+            const sockets = [
+                [`/s/${sid}/viewer`, "viser-v1.1.1"], [`/api/sessions/${sid}/simulations`],
+            ];
             const { status } = await fetch(`/api/sessions/${sid}`);
             const own = await (await fetch("/api/sessions")).json();
-            return [status, await opened, own.length];
+            return [status, await Promise.all(sockets.map(opened)), own.length];
         }""",
         sid,
     )
-    assert guessed == [404, False, 1]
+    assert guessed == [404, [False, False], 1]
     bert.page.goto(hers)
     assert "is not here" in bert.element("h1").inner_text()
     bert.click(".button")

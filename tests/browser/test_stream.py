@@ -1,0 +1,98 @@
+"""What a slider sends while it is moved, and what the page does where its websocket is lost."""
+
+import json
+
+import pytest
+
+pytestmark = pytest.mark.browser
+
+SLIDER = "front.suspension.stiffness"
+MOVE = """async ([step, moves]) => {
+    const slider = document.querySelector("#slider-front-suspension-stiffness");
+    for (let k = 1; k <= moves; k += 1) {
+        slider.value = Number(slider.value) + step;
+        slider.dispatchEvent(new Event("input", { bubbles: true }));
+        await new Promise((done) => setTimeout(done, 10));
+    }
+}"""
+
+
+def drag(visitor, step=0.5):
+    """Make 40 moves of so many N/mm in less than a second, and wait for what comes of them."""
+    before = visitor.value(SLIDER)
+    visitor.page.evaluate(MOVE, [step, 40])
+    visitor.settled()
+    assert visitor.value(SLIDER) == pytest.approx(before + 40e3 * step)
+
+
+def assert_shown_is_simulated_with_the_sliders(visitor):
+    """Oracle: the same car by a request of its own."""
+    shown, posted = visitor.page.evaluate(
+        """async () => {
+            const api = await import("/static/api.js");
+            const { request } = await import("/static/simulation.js");
+            const state = window.ridetune.state;
+            const car = { vehicle: state("vehicle"), values: state("values") };
+            const run = await api.simulate(request(car));
+            return [state("now"), run].map(({ values }) => [...values["chassis.z"]]);
+        }"""
+    )
+    assert shown == posted
+
+
+def test_values_are_sent_while_a_run_is_under_way_and_the_last_one_is_shown(visit, service):
+    sent, answered = [], []
+
+    def watch(socket):
+        if socket.url.endswith("/simulations"):
+            socket.on("framesent", lambda data: sent.append(json.loads(data)["seq"]))
+            socket.on("framereceived", lambda data: answered.append(data))
+
+    visitor = visit()
+    visitor.page.on("websocket", watch)
+    visitor.open(service.address)
+    visitor.settled()
+    drag(visitor)
+    assert sent == sorted(set(sent))
+    assert 0 < len(answered) <= len(sent) < 40
+    assert visitor.look("ridetune.state('now').head.seq") == sent[-1]
+    assert_shown_is_simulated_with_the_sliders(visitor)
+
+
+def test_without_websockets_every_value_is_a_request(visit, service):
+    """As behind a proxy that does not pass them on; the 3D view has one, too, and is not there."""
+    visitor = visit()
+    visitor.page.route_web_socket("**/api/sessions/*/simulations", lambda socket: socket.close())
+    visitor.open(service.address)
+    visitor.settled()
+    drag(visitor)
+    assert_shown_is_simulated_with_the_sliders(visitor)
+
+
+def test_a_websocket_that_is_lost_takes_no_run_with_it(visit, service):
+    """Lost with a value on the way; the next drag has a new one."""
+    lost = []
+
+    def lose_once(socket):
+        server = socket.connect_to_server()
+
+        def passed_on(message):
+            if len(lost) == 1:
+                lost.append(message)
+                socket.close()
+            else:
+                server.send(message)
+
+        socket.on_message(passed_on)
+        if not lost:
+            lost.append(socket)
+
+    visitor = visit()
+    visitor.page.route_web_socket("**/api/sessions/*/simulations", lose_once)
+    visitor.open(service.address)
+    visitor.settled()
+    drag(visitor)
+    assert len(lost) == 2
+    assert_shown_is_simulated_with_the_sliders(visitor)
+    drag(visitor, -0.25)
+    assert_shown_is_simulated_with_the_sliders(visitor)
