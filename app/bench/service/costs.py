@@ -1,19 +1,20 @@
 """Rows on what sessions, moves, jobs and uploads take of the machine."""
 
 import asyncio
+import json
 import time
 from collections.abc import Sequence
 from contextlib import closing
 from importlib.metadata import version
 
-from websockets.asyncio.client import ClientConnection, connect
+from websockets.asyncio.client import ClientConnection
 
 from ...package_files import package_folder
 from .connection import FRAMES, Connection
 from .figure import Figure, Measured
 from .pace import Pace
 from .subject import Subject, Visitor
-from .work import asked_once, ended, identification, move, sweep, vehicle_of
+from .work import asked_once, ended, identification, move, moved, sweep, vehicle_of
 
 IDLE_SESSIONS, IDLE_TARGET = 200, 1e9
 UNWATCHED_SECONDS = 2.0
@@ -34,12 +35,10 @@ async def idle(pace: Pace) -> Measured:
         tabs += [await _opened(subject, visitor) for visitor in others]
         there = subject.memory
         gone = tabs[: len(tabs) // 2]
-        for tab in gone:
-            await tab.close()
+        await _closed(gone)
         await asyncio.sleep(3 * UNWATCHED_SECONDS)
         half = subject.memory
-        for tab in tabs[len(gone) :]:
-            await tab.close()
+        await _closed(tabs[len(gone) :])
         await asyncio.sleep(3 * UNWATCHED_SECONDS)
         none = subject.memory
     most = IDLE_TARGET if pace.sessions >= IDLE_SESSIONS else None
@@ -56,8 +55,18 @@ async def idle(pace: Pace) -> Measured:
     )
 
 
-async def _opened(subject: Subject, visitor: Visitor) -> ClientConnection:
-    """What a browser asks for when a page opens, its 3D view's websocket last."""
+Tab = tuple[ClientConnection, ...]
+"""The websockets of an open page."""
+
+
+async def _closed(tabs: Sequence[Tab]) -> None:
+    for tab in tabs:
+        for socket in tab:
+            await socket.close()
+
+
+async def _opened(subject: Subject, visitor: Visitor) -> Tab:
+    """What a browser asks for when a page opens, its websockets last."""
     connection = Connection(subject.port)
     vehicle = await vehicle_of(subject, visitor)
     try:
@@ -68,16 +77,12 @@ async def _opened(subject: Subject, visitor: Visitor) -> ClientConnection:
         await connection.wanted(move(visitor, vehicle, 0, scene=True))
     finally:
         connection.close()
-    tab = await connect(
-        f"ws://127.0.0.1:{subject.port}/s/{visitor.id}/viewer",
-        additional_headers={"Authorization": f"Bearer {visitor.token}"},
-        subprotocols=[f"viser-v{version('viser')}"],  # pyright: ignore[reportArgumentType]
-        compression=None,
-        max_size=None,
-        proxy=None,
-    )
-    await tab.recv()
-    return tab
+    moves = await subject.socket(f"/api/sessions/{visitor.id}/simulations", visitor)
+    await moves.send(json.dumps(moved(vehicle, 0)))
+    await moves.recv()
+    scene = await subject.socket(f"/s/{visitor.id}/viewer", visitor, f"viser-v{version('viser')}")
+    await scene.recv()
+    return moves, scene
 
 
 async def session(pace: Pace) -> Measured:

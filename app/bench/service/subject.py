@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import psutil
+from websockets.asyncio.client import connect
 
 from ..startup import SERVE, bare_environment
 from .connection import Connection, Unexpected, request
@@ -85,6 +86,17 @@ class Subject:
             return time.perf_counter() - self.began
         finally:
             connection.close()
+
+    def socket(self, path: str, visitor: Visitor, *protocols: str) -> connect:
+        """A websocket of a visitor's, to be awaited or entered."""
+        return connect(
+            f"ws://127.0.0.1:{self.port}{path}",
+            additional_headers={"Authorization": f"Bearer {visitor.token}"},
+            subprotocols=protocols or None,  # pyright: ignore[reportArgumentType]
+            compression=None,
+            max_size=None,
+            proxy=None,
+        )
 
     def kill(self) -> None:
         """End it and all its processes as a power cut would."""

@@ -7,6 +7,7 @@ from itertools import count
 
 from .connection import Connection, request
 from .figure import Figure, Measured, percentiles
+from .hand import Hand
 from .pace import Pace
 from .subject import Subject, Visitor
 from .work import MANOEUVRE, identification, move, sweep, under_way, vehicle_of
@@ -33,13 +34,17 @@ async def slider(pace: Pace) -> Measured:
             (one, "identifications", fit),
             (other, "sweeps", sweep(SWEPT)),
         ]
+        hands = [Hand(subject, person, await vehicle_of(subject, person)) for person in people]
         async with under_way(subject, *work) as counts:
-            until = time.perf_counter() + pace.seconds
-            dragged = [_dragged(subject, one, k, until) for k, one in enumerate(people)]
-            found = await asyncio.gather(*dragged)
+            await asyncio.gather(
+                *(
+                    one.drag(MOVES_A_SECOND, k / SLIDERS, pace.seconds)
+                    for k, one in enumerate(hands)
+                )
+            )
             done = ", ".join(f"{number} {jobs}" for jobs, number in counts.items())
-    moves = [wait for waits, _ in found for wait in waits]
-    trips = [trip for _, trips in found for trip in trips]
+    replies = [wait for one in hands for wait in one.answered]
+    moves = [wait for one in hands for wait in one.known]
     what = (
         f"{SLIDERS} people move a slider {MOVES_A_SECOND:g} times a second (manoeuvre {MANOEUVRE},"
         f" 20 s) for {pace.seconds:g} s; {done} meanwhile"
@@ -47,38 +52,11 @@ async def slider(pace: Pace) -> Measured:
     return Measured(
         what,
         (
-            *percentiles("move to reply", moves, p95=SLIDER_TARGET),
-            *percentiles("request to reply", trips),
-            Figure("replies", len(trips) / pace.seconds, "1/s"),
+            *percentiles("value to its reply", replies, p95=SLIDER_TARGET),
+            *percentiles("move to a reply that knows it", moves),
+            Figure("replies", len(replies) / pace.seconds, "1/s"),
         ),
     )
-
-
-async def _dragged(
-    subject: Subject, visitor: Visitor, number: int, until: float
-) -> tuple[list[float], list[float]]:
-    """One who drags: of each move how long until a reply that knows it, of each request too.
-
-    One request is under way at a time and the newest value is next, as the page does it.
-    """
-    connection, vehicle = Connection(subject.port), await vehicle_of(subject, visitor)
-    moves: list[float] = []
-    trips: list[float] = []
-    answered, began = 0, time.perf_counter() + number / SLIDERS / MOVES_A_SECOND
-    try:
-        while (now := time.perf_counter()) < until:
-            made = int((now - began) * MOVES_A_SECOND) + 1 if now >= began else 0
-            if made <= answered:
-                await asyncio.sleep(began + made / MOVES_A_SECOND - now)
-                continue
-            await connection.wanted(move(visitor, vehicle, made))
-            done = time.perf_counter()
-            trips.append(done - now)
-            moves += [done - began - k / MOVES_A_SECOND for k in range(answered, made)]
-            answered = made
-    finally:
-        connection.close()
-    return moves, trips
 
 
 async def hello(pace: Pace) -> Measured:

@@ -36,7 +36,12 @@ async def vehicle_of(subject: Subject, visitor: Visitor) -> dict[str, Any]:
 
 def move(visitor: Visitor, vehicle: Mapping[str, Any], number: int, **more: Any) -> bytes:
     """The request of one slider move, each with a value of its own."""
-    body = {
+    return visitor.request("POST", "/simulations", moved(vehicle, number, **more), FRAMES)
+
+
+def moved(vehicle: Mapping[str, Any], number: int, **more: Any) -> dict[str, Any]:
+    """The body of one slider move."""
+    return {
         "vehicle": vehicle,
         "values": {"front.suspension.stiffness": 20_000.0 + number % 1000},
         "manoeuvre": MANOEUVRE,
@@ -47,7 +52,6 @@ def move(visitor: Visitor, vehicle: Mapping[str, Any], number: int, **more: Any)
         "channels": CHANNELS,
         **more,
     }
-    return visitor.request("POST", "/simulations", body, FRAMES)
 
 
 async def identification(subject: Subject, visitor: Visitor) -> dict[str, Any]:
