@@ -1,12 +1,13 @@
 // Columns of a file as channels: what is guessed and why, corrected by a person, applied, kept.
 
 import * as api from "./api.js";
-import { $, breakable, h, inPlace } from "./dom.js";
+import { $, h, inPlace } from "./dom.js";
+import { clockOf, clocks } from "./mapping_clock.js";
 import * as detail from "./mapping_detail.js";
 import {
-  BY_HAND, USUAL_UNITS, columnsOf, doubt, entriesOf, entryFor, isRaw, needs, offered,
+  BY_HAND, USUAL_UNITS, columnsOf, doubt, entriesOf, entryFor, isRaw, needs,
 } from "./mapping_entries.js";
-import { get } from "./store.js";
+import { rowOf } from "./mapping_row.js";
 import * as templates from "./mapping_templates.js";
 import * as units from "./units.js";
 
@@ -17,6 +18,11 @@ let host = null;
 /** What is on show: row, columns, rows (of the table, by index), entries, selected, filter, onlyMapped, shown, longest_gap, step. */
 let at = null;
 const parts = {};
+
+const ROW = {
+  entry: ({ index }) => at.entries.get(index), doubt: doubtOf, selected: () => at.selected,
+  select, edit, choose,
+};
 
 /** The view of a recording's columns. */
 export async function open(row, itsHost) {
@@ -104,7 +110,7 @@ function head() {
   const said = outcome ? outcome.warnings : warnings;
   parts.head.replaceChildren(
     h("p", { className: "hint" }, `${kind}, ${columns.length} column${columns.length === 1 ? "" : "s"}` +
-      `${groups > 1 ? ` in ${groups} groups` : ""}. ${clocks()}`),
+      `${groups > 1 ? ` in ${groups} groups` : ""}. ${clocks(at)}`),
     ...(outcome?.mapping ? [h("p", { className: "strong" }, `Applied: ${outcome.channels.length} channels, ` +
       `${units.number(outcome.duration, 3)} s, a sample every ${units.number(1000 * outcome.sample_step, 3)} ms.`)] : []),
     ...(outcome?.sign_suggestions.length ? [h("ul", { className: "warnings signs" },
@@ -131,37 +137,6 @@ async function sign(channel, confirmed = null) {
   ($(".signs button", parts.head) ?? parts.apply).focus();
 }
 
-/** Which clock the run will have, where the columns have several. */
-function clocks() {
-  const found = new Map();
-  for (const [index, { channel }] of at.entries) {
-    const clock = clockOf(at.columns[index]);
-    if (channel !== "time" && clock) found.set(clock.key, clock);
-  }
-  if (found.size < 2) return "";
-  const [finest] = [...found.values()].sort((one, other) => one.step - other.step);
-  return `The mapped columns have ${found.size} clocks; the run takes ` +
-    `${at.step ? `a sample every ${units.plain(1000 * at.step)} ms` : `the finest, ${finest.told}`}, ` +
-    "and the others are interpolated to it.";
-}
-
-const SECONDS = { s: 1, ms: 1e-3, us: 1e-6, "µs": 1e-6, min: 60 };
-
-/** {key, step, told} of the clock that the file tells of a column, or null; `step` is in s. */
-function clockOf({ clock, step, samples, group }) {
-  if (clock === null) {
-    return step === null ? null
-      : { key: `step ${step} ${samples}`, step, told: every(step) + (group ? `, as in ${group}` : "") };
-  }
-  const { name, unit, minimum, maximum } = at.columns[clock];
-  const factor = SECONDS[at.entries.get(clock)?.unit ?? (unit || "s")];
-  const mean = minimum === null || samples < 2 || !factor ? Infinity : factor * (maximum - minimum) / (samples - 1);
-  return { key: `column ${clock}`, step: mean,
-    told: `${name}${group ? ` of ${group}` : ""}${mean < Infinity ? `, ${every(mean)}` : ""}` };
-}
-
-const every = (step) => `every ${units.plain(1000 * step, 4)} ms`;
-
 function rows() {
   const words = at.filter.toLowerCase().split(/\s+/).filter(Boolean);
   const fitting = at.columns.filter(({ index, name, group, unit }) => {
@@ -175,7 +150,7 @@ function rows() {
     fitting.sort((one, other) => at.entries.has(other.index) - at.entries.has(one.index) || one.index - other.index);
   }
   const shownRows = fitting.slice(0, at.shown).map((column) => {
-    if (!at.rows.has(column.index)) at.rows.set(column.index, rowOf(column));
+    if (!at.rows.has(column.index)) at.rows.set(column.index, rowOf(column, ROW));
     return at.rows.get(column.index);
   });
   parts.rows.replaceChildren(...shownRows);
@@ -184,94 +159,6 @@ function rows() {
     ? [`${left} more; find them by a part of their name, or `,
        h("button", { type: "button", on: { click: () => { at.shown += MOST_ROWS; rows(); } } }, "show more")]
     : fitting.length ? [] : ["No column is like that."]));
-}
-
-/** A row whose controls stay while what they say is refreshed, so that no click on them is lost. */
-function rowOf(column) {
-  const { index, name, group, unit, samples } = column;
-  const numbers = h("td", { className: "range" });
-  const channel = channelSelect(column);
-  const unitTaken = unitField(column), sign = signButton(column);
-  const certain = h("td"), why = h("td", { className: "why" });
-  const row = h("tr", { dataset: { index }, on: { click: () => select(index), focusin: () => select(index) } },
-    h("th", { scope: "row" },
-      h("button", { type: "button", className: "link", title: "Look at this column" }, breakable(name)),
-      group ? h("span", { className: "group" }, breakable(group)) : null),
-    h("td", { className: "left" }, unit || h("span", { className: "soft" }, "none")),
-    h("td", {}, samples.toLocaleString("en")),
-    numbers, h("td", { className: "left" }, channel.element), h("td", {}, unitTaken.element),
-    h("td", {}, sign.element), certain, why);
-  row.refresh = () => {
-    const entry = at.entries.get(index);
-    const doubts = entry ? doubtOf(column) : "";
-    row.className = [entry ? "" : "off", doubts ? "doubted" : "", index === at.selected ? "looked-at" : ""].join(" ");
-    for (const control of [channel, unitTaken, sign]) control.refresh(entry);
-    numbers.replaceChildren(...[range(column), standIns(column, entry)].flat().filter(Boolean));
-    certain.replaceChildren(entry ? sure(entry) : "");
-    why.replaceChildren(...(entry
-      ? [doubts ? h("strong", { className: "doubt" }, `⚠ ${doubts}: `) : "", entry.note]
-      : [hintOf(column)]));
-  };
-  row.refresh();
-  return row;
-}
-
-const hintOf = ({ candidates: [first], constant }) => h("span", { className: "soft" },
-  first ? `perhaps ${first.channel}, ${percent(first.confidence)}` : constant ? "never changes" : "");
-const percent = (share) => `${Math.round(100 * share)} %`;
-
-function range({ minimum, maximum, constant, gaps }) {
-  if (minimum === null) return h("span", { className: "soft" }, "not read");
-  return [constant ? units.number(minimum, 3) : `${units.number(minimum, 3)} … ${units.number(maximum, 3)}`,
-    gaps ? h("span", { className: "group" }, `${gaps} without a number`) : null];
-}
-
-function standIns(column, entry) {
-  const { stand_ins: found, name } = column;
-  if (!found.length || !entry) return null;
-  const values = found.map(({ value }) => value);
-  const box = h("input", { type: "checkbox", checked: values.every((value) => entry.missing?.includes(value)),
-    "aria-label": `Take ${values.join(", ")} of ${name} as missing`,
-    on: { change: () => edit(column, { missing: box.checked ? values : [] }) } });
-  return h("label", { className: "stand-in",
-    title: found.map(({ value, samples }) => `${value} in ${samples} samples, far outside the rest`).join("; ") },
-  box, `${values.map((value) => units.plain(value)).join(", ")} as missing`);
-}
-
-/** The list tells each channel at length; the chosen one is its name alone, for which a row has room. */
-function channelSelect(column) {
-  const named = (name) => `${name} · ${units.channel(name).label}`;
-  const option = (name, long) => h("option", { value: name, title: units.channel(name).sign ?? "", dataset: { long } });
-  const seen = new Set(column.candidates.map(({ channel }) => channel));
-  const likely = column.candidates.map(({ channel, confidence }) =>
-    option(channel, `${named(channel)}, ${percent(confidence)}`));
-  const tell = () => {
-    for (const one of element.options) if (one.value) one.text = one.selected ? one.value : one.dataset.long;
-    element.title = element.value ? named(element.value) : "";
-  };
-  // All channels in every row of a long file would make it slow; they come with the focus.
-  const fill = () => {
-    const chosen = element.value;
-    element.append(...offered(get("channels").map(({ name }) => name)).map(([label, group]) =>
-      h("optgroup", { label }, group.filter((name) => !seen.has(name)).map((name) => option(name, named(name))))));
-    element.value = chosen;
-    tell();
-  };
-  const element = h("select", { "aria-label": `Channel of ${column.name}`,
-    on: { change: () => { choose(column, element.value); tell(); } } },
-  h("option", { value: "" }, "not used"),
-  likely.length ? h("optgroup", { label: "Likely" }, likely) : null);
-  for (const event of ["pointerdown", "focus"]) element.addEventListener(event, () => { if (!filled) fill(); filled = true; });
-  let filled = false;
-  return { element, refresh: (entry) => {
-    element.value = entry?.channel ?? "";
-    // Points of the chassis are the user's own, and so are their names.
-    if (entry && element.value !== entry.channel) {
-      element.append(option(entry.channel, named(entry.channel)));
-      element.value = entry.channel;
-    }
-    tell();
-  } };
 }
 
 /** Keys on a closed list choose as they pass, so that no other column loses its channel by it. */
@@ -315,37 +202,6 @@ function doubtOf(column) {
   return twice ? "channel taken twice" : doubt(entry, column);
 }
 
-function unitField(column) {
-  const element = h("input", { type: "text", className: "unit-taken", spellcheck: false,
-    "aria-label": `Unit of ${column.name}`,
-    on: { change: () => edit(column, { unit: element.value.trim() }) } });
-  return { element, refresh: (entry) => {
-    element.hidden = !entry;
-    if (!entry) return;
-    element.value = entry.unit;
-    const { quantity } = units.channel(entry.channel);
-    if (quantity in USUAL_UNITS) element.setAttribute("list", `units-${quantity.replace(" ", "-")}`);
-    else element.removeAttribute("list");
-  } };
-}
-
-function signButton(column) {
-  const element = h("button", { type: "button", className: "sign", "aria-label": `Turn ${column.name} over`,
-    on: { click: () => edit(column, { sign: -at.entries.get(column.index).sign, sign_sure: false }) } });
-  return { element, refresh: (entry) => {
-    element.hidden = !entry;
-    if (!entry) return;
-    element.setAttribute("aria-pressed", entry.sign < 0);
-    element.textContent = entry.sign < 0 ? "−" : "+";
-    element.title = `${entry.sign < 0 ? "Turned over" : "As in the file"}${entry.sign_sure ? ", confirmed" : ""}; ${entry.channel} is positive ` +
-      `${units.channel(entry.channel).sign ?? "as it is"}`;
-  } };
-}
-
-const sure = ({ confidence }) => confidence === null
-  ? h("span", { className: "soft" }, "by hand")
-  : h("span", { className: "sure" }, h("span", { className: "sure-bar", style: `--share: ${confidence}` }), percent(confidence));
-
 /** Change the entry of a column; what a person has said of its unit is not doubted. */
 function edit(column, changes) {
   const before = at.entries.get(column.index);
@@ -377,7 +233,7 @@ function select(index) {
 function look() {
   const column = at.columns[at.selected];
   inPlace(parts.side, () => detail.show(parts.side, at.row, column, at.entries.get(column.index), {
-    clock: clockOf(column)?.told ?? "of the column mapped as time",
+    clock: clockOf(column, at)?.told ?? "of the column mapped as time",
     edit: (changes) => edit(column, changes), choose: (channel) => choose(column, channel),
   }));
 }
