@@ -7,6 +7,7 @@ import hashlib
 import json
 import math
 import random
+import struct
 import threading
 import time
 from collections import Counter
@@ -18,6 +19,8 @@ import httpx2
 from killed_service import Service
 from ridetune.app.bench.service.work import ENDS
 from ridetune.app.package_files import package_folder
+from websockets.exceptions import ConnectionClosed, WebSocketException
+from websockets.sync.client import connect
 
 TOLERANCE = 1e-6
 """Relative, of numbers of a result: a fit that goes on from kept parts may differ in rounding."""
@@ -37,6 +40,8 @@ class Kind:
     needs_fit: bool = False
 
 
+FAULT = 1011
+"""What a websocket is closed with where the service failed."""
 MOST_UNDER_WAY = 10
 """Jobs of one client at a time: what kills put off must still be done at the end."""
 
@@ -81,6 +86,21 @@ class Session:
             verify=False,  # else it reads all certificates first
             **options,
         )
+
+    def dragged(self, service: Service, *bodies: Mapping[str, Any]) -> dict[str, Any]:
+        """The answer to the last of some simulations on their websocket: a head, or a problem."""
+        address = service.address.replace("http", "ws")
+        with connect(
+            f"{address}/api/sessions/{self.id}/simulations",
+            additional_headers={"Authorization": f"Bearer {self.token}"},
+            max_size=None,
+            proxy=None,
+        ) as socket:
+            for seq, body in enumerate(bodies):
+                socket.send(json.dumps({**body, "seq": seq}))
+            while (answer := _head(socket.recv(60.0)))["seq"] != len(bodies) - 1:
+                pass
+        return answer
 
     def has_ended(self, service: Service, kind: str, job: str) -> bool:
         """Whether a job has come to its end."""
@@ -148,8 +168,10 @@ class Client(threading.Thread):
                     self._ledger.sessions.append(self._session)
                 else:
                     self._something(self._session)
-            except httpx2.HTTPError:
+            except (httpx2.HTTPError, WebSocketException, OSError) as error:
                 self._ledger.in_doubt += 1
+                if isinstance(error, ConnectionClosed) and error.rcvd and error.rcvd.code == FAULT:
+                    self._ledger.failures.append(f"a websocket: {error}")
                 time.sleep(0.1)
             time.sleep(self._chance.uniform(0.0, 0.1))
 
@@ -161,6 +183,13 @@ class Client(threading.Thread):
             reply = session.request(self._service, "POST", path, content=data)
             if self._took(reply):
                 session.uploads[reply.json()["id"]] = data
+        elif what < 0.4:
+            body = {**SIMULATION, "vehicle": session.vehicle}
+            answer = session.dragged(self._service, *[body] * 3)
+            if "metrics" in answer:
+                self._ledger.simulated(answer["metrics"])
+            elif answer["status"] not in (429, 503):
+                self._ledger.failures.append(f"{answer['status']}: {answer['detail']}")
         elif what < 0.5:
             body = {**SIMULATION, "vehicle": session.vehicle}
             reply = session.request(self._service, "POST", "/simulations", json=body)
@@ -207,6 +236,14 @@ class Client(threading.Thread):
         elif reply.status_code >= 300:
             self._ledger.failures.append(f"{reply.status_code}: {reply.text[:200]}")
         return reply.status_code < 300
+
+
+def _head(answer: str | bytes) -> dict[str, Any]:
+    """Of a reply in frames its head, of a text all."""
+    if isinstance(answer, str):
+        return json.loads(answer)
+    (length,) = struct.unpack_from("<I", answer)
+    return json.loads(answer[4 : 4 + length])
 
 
 def opened(service: Service) -> Session:
