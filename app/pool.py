@@ -12,6 +12,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from contextvars import copy_context
 from typing import TypeVar
 
@@ -80,17 +81,26 @@ class Pool:
         asked = self._clock()
         self._under_way[session] += 1
         turn = self._turns.setdefault(session, asyncio.Semaphore(self._at_once))
+        with ExitStack() as whole:
+            whole.callback(self._over, session)
+            await turn.acquire()
+            whole.callback(turn.release)
+            # What its log records are about goes along.
+            known = copy_context()
+            begun = self._pool.submit(self._timed, asked, lambda: known.run(work))
+            ended, over = asyncio.wrap_future(begun), whole.pop_all()
+        ended.add_done_callback(lambda _: over.close())
         try:
-            async with turn:
-                # What its log records are about goes along.
-                known = copy_context()
-                return await asyncio.get_running_loop().run_in_executor(
-                    self._pool, lambda: self._timed(asked, lambda: known.run(work))
-                )
-        finally:
-            self._under_way[session] -= 1
-            if not self._under_way[session]:
-                del self._under_way[session], self._turns[session]
+            return await asyncio.shield(ended)
+        except asyncio.CancelledError:
+            # What runs already cannot be stopped, and is under way for as long as it takes.
+            begun.cancel()
+            raise
+
+    def _over(self, session: str) -> None:
+        self._under_way[session] -= 1
+        if not self._under_way[session]:
+            del self._under_way[session], self._turns[session]
 
     def _timed(self, asked: float, work: Callable[[], T]) -> T:
         """On a thread of the pool."""

@@ -133,3 +133,60 @@ def test_a_session_waits_for_its_turn_while_others_run():
 
     in_a_loop(run)
     pool.close()
+
+
+def test_what_nobody_waits_for_any_more_is_under_way_until_it_ends():
+    """Else one who asks and hangs up, again and again, would have more than a share of the pool."""
+    pool = pool_of(width=2, share=1)
+    begun, go = threading.Semaphore(0), threading.Event()
+
+    def hold() -> None:
+        begun.release()
+        assert go.wait(10)
+
+    async def run() -> None:
+        first = asyncio.create_task(pool.run("greedy", hold))
+        assert await asyncio.to_thread(begun.acquire, timeout=10)
+        first.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await first
+        with pytest.raises(Busy):
+            await pool.run("greedy", hold)
+        go.set()
+        while pool.under_way:
+            await asyncio.sleep(0.01)
+        await pool.run("greedy", hold)
+
+    in_a_loop(run)
+    pool.close()
+
+
+def test_what_waits_and_nobody_waits_for_is_dropped():
+    """Be it for a thread, or for a turn of its session."""
+    pool = pool_of(at_once=1)
+    begun, go, ran = threading.Event(), threading.Event(), []
+
+    def hold() -> None:
+        begun.set()
+        assert go.wait(10)
+
+    async def run() -> None:
+        first = asyncio.create_task(pool.run("one", hold))
+        assert await asyncio.to_thread(begun.wait, 10)
+        late = [
+            asyncio.create_task(pool.run(name, lambda: ran.append(1))) for name in ("one", "two")
+        ]
+        await asyncio.sleep(0.01)
+        assert pool.under_way == 3
+        for one in late:
+            one.cancel()
+        await asyncio.wait(late)
+        await asyncio.sleep(0.01)
+        assert pool.under_way == 1
+        go.set()
+        await first
+        assert await pool.run("two", lambda: "served") == "served"
+
+    in_a_loop(run)
+    pool.close()
+    assert ran == []
