@@ -25,7 +25,7 @@ from .problems import reply_to
 from .routes_simulations import content_of
 from .schemas import SimulationRequest
 from .services import Services, services_of
-from .sockets import hanging_up, let_in, messages, while_theirs
+from .sockets import accept, hanging_up, let_in, messages, while_theirs
 from .strict_json import read
 
 router = APIRouter()
@@ -68,7 +68,7 @@ async def stream(websocket: WebSocket, sid: str) -> None:
         await let_in(websocket, sid)
         user = await run_in_threadpool(user_of, websocket)
         with services.simulation_streams.one_more(sid):
-            await websocket.accept()
+            await accept(websocket)
             newest = _Newest()
             await while_theirs(
                 websocket,

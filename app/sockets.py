@@ -27,9 +27,13 @@ class Flooded(Busy):
 
 @asynccontextmanager
 async def hanging_up(websocket: WebSocket) -> AsyncIterator[None]:
-    """A block that may refuse: then it is hung up, with the reason if the caller may know it."""
+    """A block that may refuse: then it is hung up, with the reason if the caller may know it. A tab
+    that is gone is none of its errors.
+    """
     try:
         yield
+    except WebSocketDisconnect:
+        pass
     except NotFound:
         await hang_up(websocket, NOT_THEIRS)
     except UnknownKey as refused:
@@ -45,9 +49,18 @@ async def let_in(websocket: WebSocket, sid: str) -> None:
     await run_in_threadpool(session_of, websocket, sid)
 
 
+async def accept(websocket: WebSocket) -> None:
+    """Open it; WebSocketDisconnect where the tab is gone meanwhile."""
+    try:
+        await websocket.accept()
+    except OSError:
+        raise WebSocketDisconnect(1006) from None
+
+
 async def hang_up(websocket: WebSocket, code: int, reason: str = "") -> None:
     """Tell a tab why it gets nothing more; one that is gone meanwhile need not be told."""
-    with suppress(OSError, WebSocketDisconnect):
+    # Starlette's for one that was seen to be gone is a RuntimeError.
+    with suppress(OSError, RuntimeError, WebSocketDisconnect):
         await websocket.close(code, reason)
 
 
@@ -70,15 +83,16 @@ async def while_theirs(websocket: WebSocket, sid: str, *ways: Coroutine[Any, Any
     tasks = [asyncio.create_task(way) for way in ways]
     try:
         await asyncio.wait((lost, *tasks), return_when=asyncio.FIRST_COMPLETED)
-        hung_up = lost.done()
     finally:
         for task in (lost, *tasks):
             task.cancel()
     await asyncio.wait((lost, *tasks))
-    for task in () if hung_up else (*tasks, lost):
+    for task in (*tasks, lost):
         error = None if task.cancelled() else task.exception()
         if error is not None and not isinstance(error, WebSocketDisconnect):
             raise error
+    if not lost.cancelled():
+        await hang_up(websocket, NOT_THEIRS)
 
 
 async def _until_lost(websocket: WebSocket, sid: str) -> None:
@@ -88,4 +102,3 @@ async def _until_lost(websocket: WebSocket, sid: str) -> None:
             # While nobody can tell, it stays theirs.
             with suppress(Unavailable):
                 await let_in(websocket, sid)
-    await hang_up(websocket, NOT_THEIRS)

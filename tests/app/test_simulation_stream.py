@@ -1,18 +1,21 @@
 """Simulations over a websocket: of the requests that wait the newest is run."""
 
+import asyncio
 import json
 import threading
 
 import pytest
 from ridetune.app import sockets
+from ridetune.app.errors import NotFound
 from ridetune.app.limits import Limits
 from ridetune.app.settings import Settings
 from ridetune.app.shares import Shares
 from ridetune.app.simulation_stream import _Newest
 from ridetune.engine.vehicle_file import reference_vehicles, vehicle_to_json
-from starlette.websockets import WebSocketDisconnect
+from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from .conftest import ADDRESS, Visitor, open_client
+from .loop import in_a_loop
 from .test_frames import read_binary
 
 BINARY = {"Accept": "application/vnd.ridetune.frames"}
@@ -251,6 +254,96 @@ def test_a_fault_of_ours_is_hung_up_on_and_in_the_log_alone(client, visitor, mon
     assert (last["type"], last["code"]) == ("websocket.close", 1011)
     assert "secret" not in last["reason"]
     assert "the secret of the machine" in caplog.text
+
+
+def test_a_fault_in_looking_whose_it_is_is_one_of_ours(client, visitor, monkeypatch, caplog):
+    async def broken(*_):
+        raise RuntimeError("the secret of the machine")
+
+    monkeypatch.setattr(sockets, "LOOK_AGAIN_SECONDS", 0.05)
+    monkeypatch.setattr(sockets, "let_in", broken)
+    with opened(client, visitor) as socket:
+        last = socket.receive()
+    assert (last["type"], last["code"]) == ("websocket.close", 1011)
+    assert "the secret of the machine" in caplog.text
+
+
+def connected(send):
+    """An open websocket of which nothing is heard."""
+
+    async def receive():
+        return {"type": "websocket.connect"}
+
+    return WebSocket({"type": "websocket", "headers": []}, receive, send)
+
+
+def test_a_tab_that_goes_before_it_is_let_in_is_no_fault(client, visitor, caplog):
+    """Its server says so by an OSError."""
+    scope = {
+        "type": "websocket",
+        "path": f"/api/sessions/{visitor.id}/simulations",
+        "query_string": b"",
+        "headers": [
+            (b"host", ADDRESS.removeprefix("http://").encode()),
+            (b"authorization", f"Bearer {visitor.token}".encode()),
+        ],
+        "subprotocols": [],
+    }
+    sent = []
+
+    async def receive():
+        return {"type": "websocket.connect"}
+
+    async def send(message):
+        sent.append(message["type"])
+        raise ConnectionError
+
+    client.portal.call(client.app, scope, receive, send)
+    assert sent == ["websocket.accept"]
+    assert caplog.text == ""
+
+
+def test_a_tab_that_is_gone_need_not_be_hung_up_on():
+    async def send(message):
+        if message["type"] == "websocket.send":
+            raise ConnectionError
+
+    async def run():
+        websocket = connected(send)
+        await websocket.accept()
+        with pytest.raises(WebSocketDisconnect):
+            await websocket.send_bytes(b"a reply")
+        await sockets.hang_up(websocket, 1008)
+
+    in_a_loop(run)
+
+
+def test_who_lost_the_session_and_reads_slowly_is_hung_up_on_without_a_fault(monkeypatch):
+    """A reply that is ready while the close waits for what the tab has not read."""
+    closing, sent = asyncio.Event(), []
+
+    async def lost(*_):
+        raise NotFound("It is not yours.")
+
+    async def send(message):
+        sent.append(message["type"])
+        if message["type"] == "websocket.close":
+            closing.set()
+            await asyncio.sleep(0.05)
+
+    async def replying(websocket):
+        await closing.wait()
+        await websocket.send_bytes(b"a reply")
+
+    async def run():
+        websocket = connected(send)
+        await websocket.accept()
+        await sockets.while_theirs(websocket, "", replying(websocket))
+
+    monkeypatch.setattr(sockets, "LOOK_AGAIN_SECONDS", 0)
+    monkeypatch.setattr(sockets, "let_in", lost)
+    in_a_loop(run)
+    assert sent == ["websocket.accept", "websocket.close"]
 
 
 def test_shares_are_given_back():
