@@ -99,7 +99,8 @@ async def _answered(
         except (RideError, OSError, RequestValidationError, HTTPException) as error:
             # Where too much waits, it is refused before its turn.
             refused = taken[0] if taken else newest.take()
-            await websocket.send_text(_told(error, refused))
+            # To read a message once more may take long.
+            await websocket.send_text(await run_in_threadpool(_told, error, refused))
         else:
             await websocket.send_bytes(reply)
 

@@ -5,7 +5,7 @@ import json
 import threading
 
 import pytest
-from ridetune.app import sockets
+from ridetune.app import simulation_stream, sockets
 from ridetune.app.errors import NotFound
 from ridetune.app.limits import Limits
 from ridetune.app.settings import Settings
@@ -170,6 +170,22 @@ def test_where_too_much_waits_it_is_told_when_to_try_again(client, visitor, monk
         monkeypatch.undo()
         socket.send_json(body(4))
         assert answer(socket)[0] == 4
+
+
+def test_no_message_is_read_on_the_event_loop(client, visitor, monkeypatch):
+    """A quarter of a second of nothing but brackets would keep everybody waiting."""
+    usual, threads = simulation_stream.read, set()
+    monkeypatch.setattr(
+        simulation_stream, "read", lambda text: threads.add(threading.get_ident()) or usual(text)
+    )
+    with opened(client, visitor) as socket:
+        socket.send_json(body(3, step=0))
+        assert json.loads(socket.receive_text())["seq"] == 3
+        monkeypatch.setattr(client.app.state.services.interactive, "_most", 0)
+        socket.send_json(body(4))
+        assert json.loads(socket.receive_text())["seq"] == 4
+    assert threads
+    assert client.portal.call(threading.get_ident) not in threads
 
 
 def test_simulated_seconds_are_charged_as_by_post(client, visitor):
