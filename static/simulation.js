@@ -19,6 +19,8 @@ const BUSY = 500;
 
 const wanted = { now: false, reference: false, measured: false, scene: false };
 const underWay = { now: 0, reference: 0, alone: 0 };
+/** How many runs were refused as too many, and wait until they may be asked for again. */
+let refused = 0;
 let sequence = 0;
 /** When a run of "now" was asked for last, and what asks for the next. */
 let sent = -Infinity;
@@ -87,7 +89,7 @@ function following() {
 /** Whether one more run of "now" may begin; if it may after a while, it does. */
 function mayHurry() {
   if (!underWay.now) return true;
-  if (!stream.open()) return false;
+  if (refused || !stream.open()) return false;
   const early = sent + PACE - performance.now();
   if (early > 0) {
     timer ??= setTimeout(() => {
@@ -109,8 +111,11 @@ async function perform(kind, work) {
     }
     if (error.lost) set({ online: false });
     else if (error.code === "compiling") set({ ready: false });
-    else if (error.code === "busy") await new Promise((done) => setTimeout(done, BUSY));
-    else set({ trouble: error });
+    else if (error.code === "busy") {
+      refused += 1;
+      await new Promise((done) => setTimeout(done, BUSY));
+      refused -= 1;
+    } else set({ trouble: error });
   }
   underWay[kind] -= 1;
   begin();

@@ -96,3 +96,44 @@ def test_a_websocket_that_is_lost_takes_no_run_with_it(visit, service):
     assert_shown_is_simulated_with_the_sliders(visitor)
     drag(visitor, -0.25)
     assert_shown_is_simulated_with_the_sliders(visitor)
+
+
+def intercepted(visit, service, intercept):
+    """A visitor of whose messages some are kept from the service: `intercept(socket, message)` says
+    which, and may answer them.
+    """
+
+    def between(socket):
+        server = socket.connect_to_server()
+        socket.on_message(
+            lambda message: None if intercept(socket, message) else server.send(message)
+        )
+
+    visitor = visit()
+    visitor.page.route_web_socket("**/api/sessions/*/simulations", between)
+    visitor.open(service.address)
+    visitor.settled()
+    return visitor
+
+
+def test_where_too_much_is_asked_for_the_page_asks_less_often(visit, service):
+    """Twice a second, by the newest value alone, however many were refused before."""
+    busy, asked = [], []
+
+    def refuse(socket, message):
+        asked.append(message)
+        if busy:
+            told = {"status": 429, "code": "busy", "seq": json.loads(message)["seq"]}
+            socket.send(json.dumps(told))
+        return bool(busy)
+
+    visitor = intercepted(visit, service, refuse)
+    busy.append(True)
+    visitor.page.evaluate(MOVE, [0.5, 40])
+    visitor.page.wait_for_timeout(1500)
+    before = len(asked)
+    visitor.page.wait_for_timeout(2000)
+    assert 2 <= len(asked) - before <= 5
+    busy.clear()
+    visitor.settled()
+    assert_shown_is_simulated_with_the_sliders(visitor)
