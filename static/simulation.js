@@ -16,6 +16,8 @@ const MEASURED_SAMPLES = 4001;
 /** Milliseconds from a run of "now" that is under way to the next. */
 const PACE = 25;
 const BUSY = 500;
+/** Codes of a service that does not simulate yet, or no more; the page waits until one does. */
+const AWAY = ["compiling", "draining"];
 
 const wanted = { now: false, reference: false, measured: false, scene: false };
 const underWay = { now: 0, reference: 0, alone: 0 };
@@ -110,7 +112,7 @@ async function perform(kind, work) {
       throw error;
     }
     if (error.lost) set({ online: false });
-    else if (error.code === "compiling") set({ ready: false });
+    else if (AWAY.includes(error.code)) set({ ready: false });
     else if (error.code === "busy") {
       refused += 1;
       await new Promise((done) => setTimeout(done, BUSY));
@@ -178,7 +180,7 @@ async function retried(name, work) {
   try {
     return await work();
   } catch (error) {
-    if (error.lost || error.code === "compiling" || error.code === "busy") wanted[name] = true;
+    if (error.lost || error.code === "busy" || AWAY.includes(error.code)) wanted[name] = true;
     throw error;
   }
 }

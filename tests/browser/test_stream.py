@@ -1,8 +1,11 @@
 """What a slider sends while it is moved, and what the page does where its websocket is lost."""
 
 import json
+import signal
 
 import pytest
+
+from .conftest import AWAY, Service
 
 pytestmark = pytest.mark.browser
 
@@ -137,3 +140,23 @@ def test_where_too_much_is_asked_for_the_page_asks_less_often(visit, service):
     busy.clear()
     visitor.settled()
     assert_shown_is_simulated_with_the_sliders(visitor)
+
+
+def test_a_value_moved_while_the_service_ends_is_simulated_by_the_next_one(visit, tmp_path):
+    service = Service(tmp_path / "data", RIDETUNE_NOTICE="2")
+    try:
+        visitor = visit().open(service.address)
+        visitor.expect(*AWAY)
+        visitor.settled()
+        service.process.send_signal(signal.SIGTERM)
+        visitor.page.evaluate(MOVE, [0.5, 40])
+        banner = visitor.element("#banner")
+        visitor.wait(banner.is_visible, "the page says that the service ends")
+        service.stop()
+        service = Service(tmp_path / "data", service.port)
+        visitor.wait(lambda: not banner.is_visible(), "the page goes on")
+        visitor.settled()
+        assert visitor.look("ridetune.state('trouble')") is None
+        assert_shown_is_simulated_with_the_sliders(visitor)
+    finally:
+        service.stop()
