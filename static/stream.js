@@ -5,9 +5,16 @@ import * as api from "./api.js";
 
 /** Milliseconds after which a websocket is tried again that could not be had. */
 const AGAIN = 30_000;
+/**
+ * Milliseconds without a word, while something is asked, after which a websocket is given up: after a
+ * sleep or behind another address its connection may be gone without anybody having been told.
+ */
+const SILENCE = 15_000;
 
 let socket = null;
 let failed = -Infinity;
+/** What gives the websocket up. */
+let timer = null;
 /** What was asked and not answered, by `seq`: {body, resolve, reject}, in the order of asking. */
 const asked = new Map();
 
@@ -19,6 +26,7 @@ export function simulate(body) {
   if (performance.now() < failed + AGAIN) return api.simulate(body);
   return new Promise((resolve, reject) => {
     asked.set(body.seq, { body, resolve, reject });
+    timer ??= setTimeout(giveUp, SILENCE);
     if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(body));
     else if (socket?.readyState !== WebSocket.CONNECTING) connect();
   });
@@ -36,6 +44,8 @@ function connect() {
   mine.onmessage = ({ data }) => {
     if (typeof data !== "string") answer(api.decode(data));
     else refuse(JSON.parse(data));
+    clearTimeout(timer);
+    timer = asked.size ? setTimeout(giveUp, SILENCE) : null;
   };
   mine.onclose = () => {
     if (!opened) failed = performance.now();
@@ -64,9 +74,18 @@ function taken(seq) {
   return one;
 }
 
+function giveUp() {
+  const lost = socket;
+  failed = performance.now();
+  closed();
+  lost?.close();
+}
+
 /** What was under way is asked for once more by itself, which tells what is the matter. */
 function closed() {
   socket = null;
+  clearTimeout(timer);
+  timer = null;
   const [newest] = [...asked.values()].slice(-1);
   if (!newest) return;
   const { body, resolve, reject } = taken(newest.body.seq);

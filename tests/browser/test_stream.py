@@ -142,6 +142,15 @@ def test_where_too_much_is_asked_for_the_page_asks_less_often(visit, service):
     assert_shown_is_simulated_with_the_sliders(visitor)
 
 
+def test_a_websocket_that_falls_silent_is_given_up(visit, service):
+    """As after a laptop's sleep: what is sent goes nowhere, and nobody says so."""
+    silent = []
+    visitor = intercepted(visit, service, lambda *_: silent)
+    silent.append(True)
+    drag(visitor)
+    assert_shown_is_simulated_with_the_sliders(visitor)
+
+
 def test_a_value_moved_while_the_service_ends_is_simulated_by_the_next_one(visit, tmp_path):
     service = Service(tmp_path / "data", RIDETUNE_NOTICE="2")
     try:
