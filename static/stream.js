@@ -57,8 +57,9 @@ function answer(run) {
   taken(run.head.seq)?.resolve(run);
 }
 
+/** Of what cannot be read the service knows no number; then nothing that was asked can be. */
 function refuse(problem) {
-  taken(problem.seq)?.reject(new api.Refusal(problem, problem.status));
+  taken(problem.seq ?? Math.max(...asked.keys()))?.reject(new api.Refusal(problem, problem.status));
 }
 
 /** The request of a number; those before it were superseded. */

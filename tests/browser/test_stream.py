@@ -151,6 +151,26 @@ def test_a_websocket_that_falls_silent_is_given_up(visit, service):
     assert_shown_is_simulated_with_the_sliders(visitor)
 
 
+def test_a_message_that_cannot_be_read_is_refused_and_the_next_is_answered(visit, service):
+    """The service knows no number of it."""
+    spoilt = []
+
+    def spoil(socket, message):
+        if spoilt:
+            told = {"status": 400, "code": "bad-request", "detail": "It is not JSON."}
+            socket.send(json.dumps(told))
+        return bool(spoilt)
+
+    visitor = intercepted(visit, service, spoil)
+    spoilt.append(True)
+    drag(visitor)
+    assert visitor.look("ridetune.state('trouble').message") == "It is not JSON."
+    spoilt.clear()
+    drag(visitor, -0.25)
+    assert visitor.look("ridetune.state('trouble')") is None
+    assert_shown_is_simulated_with_the_sliders(visitor)
+
+
 def test_a_value_moved_while_the_service_ends_is_simulated_by_the_next_one(visit, tmp_path):
     service = Service(tmp_path / "data", RIDETUNE_NOTICE="2")
     try:
