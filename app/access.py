@@ -22,6 +22,7 @@ from .proxy_login import proxy_user
 from .samples import sample_project
 from .secret import hashed
 from .services import services_of
+from .session_name import free_name
 
 
 def session_of(connection: HTTPConnection, sid: str) -> str:
@@ -98,17 +99,22 @@ def own_sessions(connection: HTTPConnection) -> list[OwnSession]:
     return services_of(connection).store.owners.sessions(user=user_of(connection), tokens=tokens)
 
 
-def give_session(connection: HTTPConnection, response: Response) -> dict[str, str]:
-    """A fresh session: its id, and its token where no user owns it, set as a cookie as well."""
-    project, user = sample_project(), user_of(connection)
-    services_of(connection).callers.open_session(user or caller_of(connection))
-    sid, token = services_of(connection).store.sessions.create(
-        project.vehicle, project.measurements, user
+def give_session(
+    connection: HTTPConnection, response: Response, name: str | None = None
+) -> dict[str, str]:
+    """A fresh session: its id and name, and its token where no user owns it, set as a cookie as
+    well. Without a name it gets one that the caller's others do not have.
+    """
+    services, project, user = services_of(connection), sample_project(), user_of(connection)
+    services.callers.open_session(user or caller_of(connection))
+    named = name or free_name({one.name for one in own_sessions(connection)})
+    sid, token = services.store.sessions.create(
+        project.vehicle, project.measurements, user, named, used=name is not None
     )
     if user is not None:
-        return {"id": sid}
+        return {"id": sid, "name": named}
     cookies.give_session_token(connection, response, sid, token)
-    return {"id": sid, "token": token}
+    return {"id": sid, "name": named, "token": token}
 
 
 SessionId = Annotated[str, Depends(opened_session)]

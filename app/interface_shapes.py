@@ -53,7 +53,13 @@ MEASUREMENT = _object(
 )
 
 OWN_SESSION = _object(
-    {"id": TEXT, "created": INSTANT, "seen": INSTANT},
+    {
+        "id": TEXT,
+        "name": TEXT,
+        "created": INSTANT,
+        "seen": INSTANT,
+        "measurement_count": {"type": "integer"},
+    },
     description="A session of the caller's; `seen` is when it was used last, to a minute.",
 )
 
@@ -61,6 +67,7 @@ JOB_KINDS = ("identifications", "profiles", "sweeps", "validations", "campaigns"
 
 SHOWN: dict[str, tuple[str, bool]] = {
     "sessions_sessions": ("OwnSession", True),
+    "sessions_rename": ("OwnSession", False),
     **{f"{jobs}_{name}": ("Job", False) for jobs in JOB_KINDS for name in ("submit", "one")},
     **{f"{jobs}_cancel": ("Job", False) for jobs in JOB_KINDS},
     **{f"{jobs}_all_of_session": ("Job", True) for jobs in JOB_KINDS},
@@ -134,6 +141,8 @@ EXAMPLES: dict[str, dict[str, Any]] = {
     "advice_advise": {"fit": {"identification": "<id>"}, "before any run": {"planned": ["1"]}},
     "campaigns_submit": {"concept": {"manoeuvres": ["bump"], "noise": {"chassis.z": 0.0005}}},
     "measurements_set_conditioning": {"nothing": {"steps": []}},
+    "sessions_create": {"named": {"name": "Car 7"}},
+    "sessions_rename": {"one": {"name": "Car 7, winter tyres"}},
     "sessions_change_setup": {"search": {"starts": 8, "use": {"<id>": "hold_out"}}},
 }
 """Requests by route and name."""

@@ -21,6 +21,7 @@ class KeptSession:
     """
 
     id: str
+    name: str
     owner: str | None
     created: float
     seen: float
@@ -38,7 +39,7 @@ class KeptSessions:
 
     def list(self) -> list[KeptSession]:
         """All of them, those used latest first."""
-        columns = (sessions.c.id, sessions.c.owner, sessions.c.created, sessions.c.seen)
+        columns = [sessions.c[name] for name in ("id", "name", "owner", "created", "seen")]
         files = union(
             select(measurements.c.session, measurements.c.sha256),
             *(

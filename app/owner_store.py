@@ -9,12 +9,13 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import ColumnElement, select, update
+from sqlalchemy import ColumnElement, func, select, update
 
 from .database import Database
-from .errors import Unavailable
+from .errors import NotFound, Unavailable
 from .secret import hashed
-from .tables import sessions
+from .session_row import GONE
+from .tables import measurements, sessions
 
 SEEN_EVERY = 60.0
 
@@ -24,8 +25,14 @@ class OwnSession:
     """A session in the list of its owner's; instants in s since the epoch."""
 
     id: str
+    name: str
     created: float
     seen: float
+    measurements: int
+
+
+_HELD = select(func.count()).where(measurements.c.session == sessions.c.id).scalar_subquery()
+_LISTED = select(sessions.c.id, sessions.c.name, sessions.c.created, sessions.c.seen, _HELD)
 
 
 class OwnerStore:
@@ -52,14 +59,20 @@ class OwnerStore:
 
     def sessions(self, *, user: str | None, tokens: Collection[str]) -> list[OwnSession]:
         """The caller's sessions, those used latest first."""
-        query = select(sessions.c.id, sessions.c.created, sessions.c.seen).where(
-            _mine(user, tokens)
-        )
+        query = _LISTED.where(_mine(user, tokens))
         with self._database.reading() as connection:
             rows = connection.execute(
                 query.order_by(sessions.c.seen.desc(), sessions.c.created.desc())
             ).all()
         return [OwnSession(*row) for row in rows]
+
+    def session(self, session: str) -> OwnSession:
+        """One session as the list has it."""
+        with self._database.reading() as connection:
+            row = connection.execute(_LISTED.where(sessions.c.id == session)).one_or_none()
+        if row is None:
+            raise NotFound(GONE)
+        return OwnSession(*row)
 
 
 def _mine(user: str | None, tokens: Collection[str]) -> ColumnElement[Any]:

@@ -16,34 +16,34 @@ from .instants import instant
 from .job_routes import all_to_json
 from .login import require_let_in
 from .measurement_view import measurements_to_json
+from .owner_store import OwnSession
 from .routes_identifications import VIEW as IDENTIFICATION
 from .routes_sweeps import VIEW as SWEEP
-from .schemas import JsonObject
+from .schemas import JsonObject, NewSession, SessionNameForm
 from .services import Shared
 from .setup_form import SetupForm
 from .strict_json import StrictRoute
 
 router = APIRouter(prefix="/api/sessions", tags=["sessions"], route_class=StrictRoute)
 
+UNNAMED = NewSession()
 VehicleBody = Annotated[JsonObject, Body(description="A vehicle as docs/files describes it, SI.")]
 
 
 @router.post("", status_code=201)
-def create(request: Request, response: Response) -> dict[str, str]:
-    """A fresh session with the sample project. Its token comes as a cookie and in the body; who
-    brings a key, or is named by the proxy, owns it and needs none.
+def create(request: Request, response: Response, body: NewSession = UNNAMED) -> dict[str, str]:
+    """A fresh session with the sample project, called as the body says, if one is sent. Its token
+    comes as a cookie and in the reply; who brings a key, or is named by the proxy, owns it and
+    needs none.
     """
     require_let_in(request)
-    return give_session(request, response)
+    return give_session(request, response, body.name)
 
 
 @router.get("")
 def sessions(request: Request) -> list[dict[str, Any]]:
     """The caller's own sessions, those used latest first."""
-    return [
-        {"id": one.id, "created": instant(one.created), "seen": instant(one.seen)}
-        for one in own_sessions(request)
-    ]
+    return [_summary(one) for one in own_sessions(request)]
 
 
 @router.get("/{sid}")
@@ -52,6 +52,7 @@ def read(sid: SessionId, services: Shared) -> dict[str, Any]:
     session = services.store.sessions.get(sid)
     return {
         "id": sid,
+        "name": session.name,
         "vehicle": session.vehicle,
         "baseline": session.baseline,
         "setup": session.setup,
@@ -59,6 +60,13 @@ def read(sid: SessionId, services: Shared) -> dict[str, Any]:
         "identifications": all_to_json(services, sid, IDENTIFICATION),
         "sweeps": all_to_json(services, sid, SWEEP),
     }
+
+
+@router.patch("/{sid}")
+def rename(sid: SessionId, services: Shared, body: SessionNameForm) -> dict[str, Any]:
+    """Call the session something else."""
+    services.store.sessions.rename(sid, body.name)
+    return _summary(services.store.owners.session(sid))
 
 
 @router.delete("/{sid}", status_code=204)
@@ -109,3 +117,13 @@ async def setup(sid: SessionId, services: Shared) -> dict[str, Any] | None:
 def change_setup(sid: SessionId, services: Shared, body: SetupForm) -> dict[str, Any]:
     """Change parts of it; what is told of a measurement goes with it."""
     return services.store.setups.change(sid, body)
+
+
+def _summary(session: OwnSession) -> dict[str, Any]:
+    return {
+        "id": session.id,
+        "name": session.name,
+        "created": instant(session.created),
+        "seen": instant(session.seen),
+        "measurement_count": session.measurements,
+    }

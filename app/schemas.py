@@ -37,6 +37,7 @@ from ..engine.simulation.rims_settings import (
     RimsSettings,
 )
 from ..engine.simulation.step_limits import LONGEST_SAMPLE_STEP, LONGEST_STEP, SHORTEST_STEP
+from .session_name import LONGEST, on_one_line
 
 Number = Annotated[FiniteFloat, Strict()]
 Whole = Annotated[int, Strict()]
@@ -78,6 +79,19 @@ def _part_of_path(value: str) -> str:
     return value
 
 
+def _session_name(value: str) -> str:
+    """The name of a session, as it is kept."""
+    try:
+        return on_one_line(value)
+    except ValueError as error:
+        raise PydanticCustomError("name", "{said}", {"said": str(error)}) from None
+
+
+SessionName = Annotated[
+    str,
+    AfterValidator(_session_name),
+    Field(description=f"1 to {LONGEST} characters without control characters."),
+]
 KeyOrObject = Annotated[str | JsonObject, BeforeValidator(_key_or_object)]
 PathName = Annotated[Name, AfterValidator(_part_of_path)]
 
@@ -275,6 +289,18 @@ class ConditioningRequest(WireForm):
 
     steps: Annotated[list[JsonObject], Field(max_length=100)]
     vehicle: JsonObject | None = None
+
+
+class NewSession(WireForm):
+    """What a fresh session is called; untold a name that its visitor's others do not have."""
+
+    name: SessionName | None = None
+
+
+class SessionNameForm(WireForm):
+    """What a session is called."""
+
+    name: SessionName
 
 
 class NamedMapping(WireForm):

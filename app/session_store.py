@@ -26,13 +26,14 @@ from .limits import Limits
 from .measurement import NewMeasurement
 from .measurement_store import MeasurementStore
 from .secret import hashed, new_secret
+from .session_name import DEFAULT
 from .session_row import GONE, delete_sessions
 from .tables import sessions
 
 UNUSED_AFTER = 3600.0
 
 # Made once: to make it takes as long as to execute it.
-_KEPT = select(sessions.c.vehicle, sessions.c.baseline, sessions.c.setup).where(
+_KEPT = select(sessions.c.name, sessions.c.vehicle, sessions.c.baseline, sessions.c.setup).where(
     sessions.c.id == bindparam("session")
 )
 
@@ -45,6 +46,7 @@ class Session:
     """
 
     id: str
+    name: str
     vehicle: dict[str, Any]
     baseline: dict[str, Any]
     setup: dict[str, Any] | None
@@ -73,9 +75,14 @@ class SessionStore:
         vehicle: Mapping[str, Any],
         samples: Sequence[NewMeasurement],
         owner: str | None = None,
+        name: str = DEFAULT,
+        *,
+        used: bool = False,
     ) -> tuple[str, str]:
         """Id and token of a fresh session that holds a vehicle and sample measurements; the token
         opens it where it has no owner.
+
+        used : whether it holds something of its visitor's already, as a name of their choice
         """
         session, token, now = secrets.token_hex(8), new_secret(), time.time()
         text = json.dumps(vehicle)
@@ -88,8 +95,10 @@ class SessionStore:
                     owner=owner,
                     created=now,
                     seen=now,
+                    used=used,
                     vehicle=text,
                     baseline=text,
+                    name=name,
                 )
             )
             self._measurements.insert(connection, session, samples)
@@ -122,10 +131,15 @@ class SessionStore:
             raise NotFound(GONE)
         return Session(
             session,
+            row.name,
             json.loads(row.vehicle),
             json.loads(row.baseline),
             row.setup and json.loads(row.setup),
         )
+
+    def rename(self, session: str, name: str) -> None:
+        """Call it something else."""
+        self._set(session, name=name, used=True)
 
     def set_vehicle(self, session: str, vehicle: Mapping[str, Any]) -> None:
         """Replace the car being tuned."""

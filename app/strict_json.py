@@ -37,7 +37,7 @@ class StrictRoute(APIRoute):
             if self.body_field is not None:
                 # FastAPI reads a body before it asks who sends it, and a large one takes long.
                 await _require_owner(request)
-                if not await request.body():
+                if self.body_field.field_info.is_required() and not await request.body():
                     raise HTTPException(400, "The body is empty; send JSON.")
             return await handler(request)
 

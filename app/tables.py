@@ -20,6 +20,8 @@ from sqlalchemy import (
     UniqueConstraint,
 )
 
+from .session_name import DEFAULT, LONGEST
+
 MIGRATIONS: tuple[tuple[str, ...], ...] = (
     (),  # Tables that a version lacks are made anyway: here the files of jobs.
     ("ALTER TABLE measurements ADD COLUMN manoeuvre TEXT",),
@@ -41,6 +43,7 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         "CREATE INDEX sessions_by_token ON sessions (token_hash)",
     ),
     ("ALTER TABLE browsers ADD COLUMN token_mark VARCHAR(64)",),
+    ("ALTER TABLE sessions ADD COLUMN name VARCHAR(80) NOT NULL DEFAULT 'Project'",),
 )
 """What leads from each version of the schema, the first being 1, to the next."""
 
@@ -71,6 +74,7 @@ sessions = Table(
     Column("baseline", Text, nullable=False),
     Column("setup", Text),
     Column("owner", Text),  # null: whoever holds the token
+    Column("name", String(LONGEST), nullable=False, default=DEFAULT),
 )
 
 links = Table(

@@ -41,17 +41,22 @@ def _print(known: Sequence[KeptSession]) -> None:
             str(session.measurements),
             str(session.jobs),
             f"{session.bytes / 1e6:.1f}",
+            _on_a_line(session.name),
         )
         for session in known
     )
-    head = ("id", "owner", "created", "used last", "recordings", "jobs", "MB of files")
+    head = ("id", "owner", "created", "used last", "recordings", "jobs", "MB of files", "name")
     print_table([head, *rows], right=(4, 5, 6))
 
 
 def _owner(owner: str | None) -> str:
-    """A user as a person calls them; whatever a proxy has sent, it is one line."""
+    """A user as a person calls them."""
     if owner is None:
         return "a browser"
     kind, _, name = owner.partition(":")
-    shown = "".join(letter if letter.isprintable() else "?" for letter in name)
-    return f"{kind} {shown}"
+    return f"{kind} {_on_a_line(name)}"
+
+
+def _on_a_line(name: str) -> str:
+    """A name on one line, whatever a proxy or a visitor has sent."""
+    return "".join(letter if letter.isprintable() else "?" for letter in name)

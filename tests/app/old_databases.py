@@ -26,6 +26,7 @@ DDL: dict[str, list[tuple[int, str]]] = {
         (1, "baseline TEXT NOT NULL"),
         (6, "setup TEXT"),
         (8, "owner TEXT"),
+        (10, "name VARCHAR(80) NOT NULL"),
         (1, "PRIMARY KEY (id)"),
     ],
     "uploads": [
@@ -204,6 +205,7 @@ def _all_rows(version: int) -> dict[str, list[dict[str, Any]]]:
                 "baseline": car,
                 "setup": '{"starts": 8}',
                 "owner": None,
+                "name": "Fahrzeug 7",
             }
         ],
         "uploads": [

@@ -206,7 +206,7 @@ def test_a_key_makes_lists_and_uses_its_own_sessions(client):
     rig, bench = bearer(keys.add("rig")), bearer(keys.add("bench"))
     made = client.post("/api/sessions", headers=rig)
     assert made.status_code == 201
-    assert set(made.json()) == {"id"}
+    assert set(made.json()) == {"id", "name"}
     assert "set-cookie" not in made.headers
     sid = made.json()["id"]
     assert [one["id"] for one in client.get("/api/sessions", headers=rig).json()] == [sid]

@@ -39,6 +39,7 @@ def filled(store: Store) -> tuple[list[str], list[str]]:
         store.mappings.keep(session, "Fahrzeug \u0663 – 7", {"columns": [1]})
         store.setups.change(session, SetupForm(starts=16))
         store.sessions.set_vehicle(session, {"name": "my car", "mass": 0.1 + 0.2})
+        store.sessions.rename(session, "Fahrzeug \u0663 – 7")
         spec = {"runs": [{"id": one.id, "name": "run"}], "asked": "a fit"}
         done, failed, waiting = (
             store.jobs.add(session, "test", spec, key, priority=3)[0].id for key in ("a", "b", None)

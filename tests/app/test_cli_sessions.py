@@ -36,6 +36,7 @@ def listed(capsys) -> list[list[str]]:
 def test_the_list_tells_whose_a_session_is_and_what_it_holds(store, capsys):
     owners = (None, "key:rig 3", "user:anna\x1b[2J")
     made = [store.sessions.create(CAR, [recording(b"0" * 400_000)], owner)[0] for owner in owners]
+    store.sessions.rename(made[2], "car 7\u200d of Anna")
     store.measurements.add(made[0], recording(b"1" * 500_000))
     job, _ = store.jobs.add(made[0], "test", {"runs": [], "asked": "a fit"}, None)
     store.finish_job(job.id, "done", result={}, file=b"2" * 600_000)
@@ -44,9 +45,9 @@ def test_the_list_tells_whose_a_session_is_and_what_it_holds(store, capsys):
     for id, told in zip(
         made,
         (
-            ["a browser", "2", "1", "1.5"],
-            ["key rig 3", "1", "0", "0.4"],
-            ["user anna?[2J", "1", "0", "0.4"],
+            ["a browser", "2", "1", "1.5", "Project"],
+            ["key rig 3", "1", "0", "0.4", "Project"],
+            ["user anna?[2J", "1", "0", "0.4", "car 7? of Anna"],
         ),
         strict=True,
     ):

@@ -34,8 +34,10 @@ def test_the_list_tells_when_a_session_was_made_and_used_last(visitor):
     assert visitor.client.get("/api/sessions", headers=mine).json() == [
         {
             "id": visitor.id,
+            "name": "Project",
             "created": "2023-11-14T22:13:20.250000+00:00",
             "seen": "2023-11-14T22:14:20+00:00",
+            "measurement_count": 2,
         }
     ]
 

@@ -74,6 +74,10 @@ def test_a_database_of_an_earlier_version_works_like_any_other(tmp_path, old):
     assert "car 8" in store.mappings.of_session("s1")
     store.setups.change("s1", SetupForm(starts=16))
     assert (store.sessions.get("s1").setup or {})["starts"] == 16
+    [one] = store.owners.sessions(user=None, tokens=[TOKEN])
+    assert (one.name, one.measurements) == ("Fahrzeug 7" if version >= 10 else "Project", 1)
+    store.sessions.rename("s1", "car 8")
+    assert store.sessions.get("s1").name == "car 8"
     claimed = store.leases.claim("me", 5)
     assert [(job.id, job.restarts) for job in claimed] == [("queued", 0), ("running", 1)]
     assert store.keep_part("running", "second", b"half the rows")
