@@ -48,14 +48,16 @@ class OwnerStore:
             seen = connection.execute(select(sessions.c.seen).where(mine)).scalar()
         if seen is None:
             return False
-        now = time.time()
-        if seen < now - SEEN_EVERY:
-            # Where nothing can be written, what is kept may still be looked at.
-            with suppress(Unavailable), self._database.writing() as connection:
-                connection.execute(
-                    update(sessions).where(sessions.c.id == session).values(seen=now)
-                )
+        if seen < time.time() - SEEN_EVERY:
+            self.note_use(session)
         return True
+
+    def note_use(self, session: str) -> None:
+        """Note that a session is in use, at this very moment."""
+        # Where nothing can be written, what is kept may still be looked at.
+        with suppress(Unavailable), self._database.writing() as connection:
+            mine = update(sessions).where(sessions.c.id == session)
+            connection.execute(mine.values(seen=time.time()))
 
     def sessions(self, *, user: str | None, tokens: Collection[str]) -> list[OwnSession]:
         """The caller's sessions, those used latest first."""

@@ -4,6 +4,7 @@ from urllib.parse import urlencode
 
 from fastapi import APIRouter, Request
 from fastapi.responses import FileResponse, RedirectResponse, Response
+from starlette.concurrency import run_in_threadpool
 
 from . import cookies, messages
 from .access import give_session, opened_session, own_sessions
@@ -42,14 +43,16 @@ def start(request: Request, services: Shared) -> Response:
 
 
 @router.get("/s/{sid}/", include_in_schema=False)
-async def page(sid: str, request: Request) -> Response:
-    """The page itself; all it shows it asks of /api."""
+async def page(sid: str, request: Request, services: Shared) -> Response:
+    """The page itself; all it shows it asks of /api. What was opened last, `/` leads to."""
     if _came_from_elsewhere(request):
         return messages.knock_again(request)
     try:
         await opened_session(request, sid)
     except NotFound:
         return messages.no_such_session()
+    if not wants_head_alone(request):
+        await run_in_threadpool(services.store.owners.note_use, sid)
     response = FileResponse(package_folder("static") / "index.html")
     cookies.renew(request, response, sid)
     return response

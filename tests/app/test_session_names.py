@@ -90,6 +90,17 @@ def test_nobody_names_anothers_session(client, named):
     assert client.app.state.services.store.sessions.get(named).name == "Car 7"
 
 
+def test_the_session_that_was_opened_last_stands_first_and_is_led_to(client):
+    """However little later than another; HEAD opens nothing."""
+    made = [client.post("/api/sessions").json()["id"] for _ in "abc"]
+    listed = lambda: [one["id"] for one in client.get("/api/sessions").json()]  # noqa: E731
+    assert listed() == made[::-1]
+    client.get(f"/s/{made[1]}/")
+    client.head(f"/s/{made[0]}/")
+    assert listed() == [made[1], made[2], made[0]]
+    assert client.get("/", follow_redirects=False).headers["location"] == f"/s/{made[1]}/"
+
+
 def test_a_session_that_was_named_is_not_let_go_of_to_make_room(tmp_path, database, monkeypatch):
     store = Store(tmp_path, Limits(user_sessions=3), database)
     monkeypatch.setattr(session_store, "UNUSED_AFTER", -1.0)
