@@ -14,7 +14,7 @@ from starlette.requests import HTTPConnection
 
 from . import cookies, logs
 from .callers import caller_of
-from .errors import NotFound
+from .errors import Busy, NotFound
 from .login import is_let_in, require_let_in, user_of
 from .origins import bearer
 from .owner_store import OwnSession
@@ -107,7 +107,13 @@ def give_session(
     """
     services, project, user = services_of(connection), sample_project(), user_of(connection)
     services.callers.open_session(user or caller_of(connection))
-    named = name or free_name({one.name for one in own_sessions(connection)})
+    own, most = own_sessions(connection), services.settings.limits.browser_sessions
+    if user is None and len(own) >= most:
+        raise Busy(
+            f"This browser already has the tokens of {most} projects (sessions), and would lose "
+            "some with more; delete one that is no longer needed."
+        )
+    named = name or free_name({one.name for one in own})
     sid, token = services.store.sessions.create(
         project.vehicle, project.measurements, user, named, used=name is not None
     )

@@ -29,6 +29,7 @@ class Limits:
     reader_seconds: int = 20
     sessions: int = 1000
     user_sessions: int = 200
+    browser_sessions: int = 50
     new_sessions: int = 60
     session_measurements: int = 50
     session_bytes: int = 500_000_000

@@ -1,13 +1,15 @@
 """What sessions are called: the names of their visitors, and those they get by themselves."""
 
 import pytest
+from fastapi.testclient import TestClient
 from ridetune.app import session_store
 from ridetune.app.errors import Busy
 from ridetune.app.limits import Limits
 from ridetune.app.session_name import free_name, on_one_line
+from ridetune.app.settings import Settings
 from ridetune.app.store import Store
 
-from .conftest import Visitor
+from .conftest import ADDRESS, Visitor, open_client
 
 CAR = {"name": "a car"}
 NAMES = ["Car 7", "Wagen 7 – Winterreifen", "م\u200cم", "👩\u200d🔧", "x" * 80, "a\u00a0b"]
@@ -115,3 +117,16 @@ def test_a_session_that_was_named_is_not_let_go_of_to_make_room(tmp_path, databa
     with pytest.raises(Busy, match="3 sessions"):
         make()
     store.close()
+
+
+def test_a_browser_begins_no_more_sessions_than_it_can_hold_tokens_of(tmp_path):
+    """It would forget some; oracle: there is room again for one that was deleted."""
+    settings = Settings(data=tmp_path, limits=Limits(browser_sessions=2))
+    with open_client(settings) as client:
+        first, _ = (client.post("/api/sessions").json()["id"] for _ in "ab")
+        reply = client.post("/api/sessions")
+        assert reply.status_code == 429
+        assert "2 projects" in reply.json()["detail"]
+        assert TestClient(client.app, base_url=ADDRESS).post("/api/sessions").status_code == 201
+        client.delete(f"/api/sessions/{first}")
+        assert client.post("/api/sessions").status_code == 201
