@@ -106,6 +106,12 @@ export const readSensors = (file) => json("POST", "/api/sensors", { body: inForm
 export const roads = () => json("GET", "/api/roads");
 export const rimsSettings = () => json("GET", "/api/rims-settings");
 
+// The sessions of the visitor
+export const sessions = () => json("GET", "/api/sessions");
+/** A fresh one; without a name the service finds one. */
+export const newSession = (name) => json("POST", "/api/sessions", name ? { body: { name } } : {});
+export const deleteSession = (id) => json("DELETE", `/api/sessions/${encodeURIComponent(id)}`);
+
 // The session
 export const session = () => json("GET", base);
 /** `leaving`: the request outlives the page, for which browsers take up to 64 KiB. */
@@ -113,6 +119,7 @@ export const saveVehicle = (vehicle, leaving = false) =>
   json("PUT", `${base}/vehicle`, { body: vehicle, keepalive: leaving });
 export const changeSetup = (changes, leaving = false) =>
   json("PATCH", `${base}/setup`, { body: changes, keepalive: leaving });
+export const renameSession = (name) => json("PATCH", base, { body: { name } });
 export const saveBaseline = (vehicle) => json("PUT", `${base}/baseline`, { body: vehicle });
 export const simulate = (body) =>
   frames("POST", `${base}/simulations`, { body, accept: FRAMES });

@@ -23,6 +23,7 @@ import * as keeping from "./keeping.js";
 import * as measurements from "./measurements.js";
 import { banner, build as buildNotices, notice, refused } from "./notices.js";
 import * as profile from "./profile.js";
+import * as projects from "./projects.js";
 import * as ride from "./ride.js";
 import * as scene from "./scene.js";
 import { idle, timing, want } from "./simulation.js";
@@ -55,7 +56,7 @@ async function start() {
   const { vehicle, measurements: rows } = session;
   const baseline = session.baseline ?? vehicle;
   set({ parameters, channels, vehicles, manoeuvres, plants, formats, roads, vehicle, baseline, measurements: rows,
-    rimsUsual: rimsSettings });
+    rimsUsual: rimsSettings, name: session.name });
   const usable = rows.find((row) => row.usable_for_identification);
   set({
     ...keeping.taken(session.setup, rimsSettings),
@@ -80,6 +81,7 @@ function build() {
   timeline.build();
   timeline.listenToKeys();
   buildNotices();
+  projects.build();
   controls.build({ onBaseline: setBaseline });
   ride.build();
   charts.build(() => want("now", "reference"));

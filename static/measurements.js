@@ -357,6 +357,12 @@ async function preview(row, name, drawing, facts) {
   fitWidth(plot, drawing);
 }
 
+/** Once nothing is asked of the service for what is on show. */
+export async function atRest() {
+  await looking;
+  await settled();
+}
+
 let deleting = Promise.resolve();
 /** Once the service has deleted what the page has let go of. */
 export const deleted = () => deleting;
@@ -378,8 +384,7 @@ async function remove(row, event) {
 }
 
 async function letGo(row) {
-  await looking;
-  await settled();
+  await atRest();
   try {
     await api.deleteMeasurement(row.id);
   } catch (error) {

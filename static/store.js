@@ -1,6 +1,7 @@
 // What the page knows, in one place. Keys:
 //
 //   session      its id
+//   name         what it is called; a session is a project
 //   parameters   rows of /api/parameters
 //   channels     rows of /api/channels
 //   vehicle      the session's vehicle, with the sliders' values in it
