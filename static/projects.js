@@ -19,7 +19,7 @@ let busy = false;
 const parts = {};
 
 export function build() {
-  parts.said = h("p", { className: "problem", role: "alert", hidden: true });
+  parts.said = h("p", { className: "refusal", role: "alert", hidden: true });
   parts.list = h("ul", { className: "project-list scrolls", "aria-label": "Projects" });
   parts.fresh = h("input", { type: "text", id: "new-name", maxLength: LONGEST, placeholder: "Name, if you like",
     autocomplete: "off", "aria-label": "Name of the new project" });
