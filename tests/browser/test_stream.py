@@ -142,6 +142,7 @@ def test_where_too_much_is_asked_for_the_page_asks_less_often(visit, service):
     assert_shown_is_simulated_with_the_sliders(visitor)
 
 
+@pytest.mark.slow
 def test_a_websocket_that_falls_silent_is_given_up(visit, service):
     """As after a laptop's sleep: what is sent goes nowhere, and nobody says so."""
     silent = []
