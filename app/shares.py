@@ -32,4 +32,4 @@ class Shares:
 
     def of(self, session: str) -> int:
         """How many a session has open."""
-        return self._open.get(session, 0)
+        return self._open[session]

@@ -13,7 +13,7 @@ from .buckets import Buckets
 from .errors import Busy, NotFound, Unavailable, UnknownKey
 from .limits import Limits
 
-NOT_THEIRS, FLOODED, LATER = 1008, 1008, 1013
+REFUSED, LATER = 1008, 1013
 """Close codes: to the latter, a page connects again."""
 BURST_SECONDS = 5
 """How long a tab may send as fast as it can, in what it may send a second."""
@@ -35,11 +35,9 @@ async def hanging_up(websocket: WebSocket) -> AsyncIterator[None]:
     except WebSocketDisconnect:
         pass
     except NotFound:
-        await hang_up(websocket, NOT_THEIRS)
-    except UnknownKey as refused:
-        await hang_up(websocket, NOT_THEIRS, str(refused))
-    except Flooded as refused:
-        await hang_up(websocket, FLOODED, str(refused))
+        await hang_up(websocket, REFUSED)
+    except (UnknownKey, Flooded) as refused:
+        await hang_up(websocket, REFUSED, str(refused))
     except (Busy, Unavailable) as refused:
         await hang_up(websocket, LATER, str(refused))
 
@@ -92,7 +90,7 @@ async def while_theirs(websocket: WebSocket, sid: str, *ways: Coroutine[Any, Any
         if error is not None and not isinstance(error, WebSocketDisconnect):
             raise error
     if not lost.cancelled():
-        await hang_up(websocket, NOT_THEIRS)
+        await hang_up(websocket, REFUSED)
 
 
 async def _until_lost(websocket: WebSocket, sid: str) -> None:

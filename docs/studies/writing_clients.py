@@ -7,7 +7,6 @@ import hashlib
 import json
 import math
 import random
-import struct
 import threading
 import time
 from collections import Counter
@@ -17,7 +16,7 @@ from typing import Any
 
 import httpx2
 from killed_service import Service
-from ridetune.app.bench.service.work import ENDS
+from ridetune.app.bench.service.work import ENDS, head_of
 from ridetune.app.package_files import package_folder
 from websockets.exceptions import ConnectionClosed, WebSocketException
 from websockets.sync.client import connect
@@ -98,9 +97,11 @@ class Session:
         ) as socket:
             for seq, body in enumerate(bodies):
                 socket.send(json.dumps({**body, "seq": seq}))
-            while (answer := _head(socket.recv(60.0)))["seq"] != len(bodies) - 1:
-                pass
-        return answer
+            while True:
+                answer = socket.recv(60.0)
+                told = json.loads(answer) if isinstance(answer, str) else head_of(answer)
+                if told["seq"] == len(bodies) - 1:
+                    return told
 
     def has_ended(self, service: Service, kind: str, job: str) -> bool:
         """Whether a job has come to its end."""
@@ -236,14 +237,6 @@ class Client(threading.Thread):
         elif reply.status_code >= 300:
             self._ledger.failures.append(f"{reply.status_code}: {reply.text[:200]}")
         return reply.status_code < 300
-
-
-def _head(answer: str | bytes) -> dict[str, Any]:
-    """Of a reply in frames its head, of a text all."""
-    if isinstance(answer, str):
-        return json.loads(answer)
-    (length,) = struct.unpack_from("<I", answer)
-    return json.loads(answer[4 : 4 + length])
 
 
 def opened(service: Service) -> Session:

@@ -2,7 +2,6 @@
 
 import asyncio
 import json
-import struct
 import time
 from collections.abc import Mapping
 from typing import Any
@@ -11,7 +10,7 @@ from websockets.asyncio.client import ClientConnection
 
 from .connection import Unexpected
 from .subject import PATIENCE, Subject, Visitor
-from .work import moved
+from .work import head_of, moved
 
 
 class Hand:
@@ -46,13 +45,7 @@ class Hand:
             now = time.perf_counter()
             if isinstance(reply, str):
                 raise Unexpected(f"The service answered a move with {reply[:300]}.")
-            number = _number(reply)
+            number = head_of(reply)["seq"]
             self.answered.append(now - sent[number])
             self.known += [now - at for at in sent[self._known_moves : number + 1]]
             self._known_moves = number + 1
-
-
-def _number(reply: bytes) -> int:
-    """Which move a reply answers."""
-    (length,) = struct.unpack_from("<I", reply)
-    return json.loads(reply[4 : 4 + length])["seq"]

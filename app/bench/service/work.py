@@ -1,6 +1,8 @@
 """What the service is asked to do: simulations as a slider asks for them, and jobs."""
 
 import asyncio
+import json
+import struct
 import time
 from collections.abc import Mapping
 from contextlib import asynccontextmanager
@@ -52,6 +54,12 @@ def moved(vehicle: Mapping[str, Any], number: int, **more: Any) -> dict[str, Any
         "channels": CHANNELS,
         **more,
     }
+
+
+def head_of(reply: bytes) -> dict[str, Any]:
+    """What a simulation's reply in frames tells before its histories."""
+    (length,) = struct.unpack_from("<I", reply)
+    return json.loads(reply[4 : 4 + length])
 
 
 async def identification(subject: Subject, visitor: Visitor) -> dict[str, Any]:
