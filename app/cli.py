@@ -16,8 +16,8 @@ from importlib.metadata import version
 from typing import Any, NoReturn
 
 from ..engine.errors import RideError
-from . import command_options as takes
-from .command_parser import BAD_INPUT, Parser
+from .commands import options as takes
+from .commands.parser import BAD_INPUT, Parser
 
 INTERRUPTED = 130  # 128 + SIGINT, as shells report it
 PIPE_CLOSED = 141  # 128 + SIGPIPE
@@ -113,8 +113,8 @@ def _compiling(run: Callable[[argparse.Namespace], None]) -> Callable[[argparse.
 
 
 def _serve(options: argparse.Namespace) -> None:
-    from .forking import load_early
     from .settings import Settings
+    from .simulators.forking import load_early
 
     settings = Settings.from_environment(
         host=options.host, port=options.port, data=options.data, login=options.login

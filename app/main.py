@@ -13,57 +13,40 @@ from importlib.util import find_spec
 from fastapi import FastAPI
 from fastapi.staticfiles import StaticFiles
 
-from . import (
-    routes_advice,
-    routes_campaigns,
-    routes_catalogue,
-    routes_conditioning,
-    routes_health,
-    routes_identifications,
-    routes_mappings,
-    routes_measurements,
-    routes_metrics,
-    routes_page,
-    routes_profiles,
-    routes_sessions,
-    routes_simulations,
-    routes_sweeps,
-    routes_validations,
-    simulation_stream,
-)
-from .callers import Callers
-from .campaign_job import KIND as CAMPAIGN
-from .campaign_job import campaign
-from .cluster import Cluster
-from .draining import Drain, Draining
-from .guard import Guard
-from .heads import Heads
-from .heartbeat import beat
-from .identification_job import KIND as IDENTIFICATION
-from .identification_job import identify_runs, of_recordings
-from .interface import describe, operation_id
-from .jobs import Jobs
+from .access.guard import Guard
+from .jobs.cluster import Cluster
+from .jobs.jobs import Jobs
 from .limits import Limits
-from .metrics import Metrics
-from .observed import Observed
 from .package_files import package_folder
-from .pool import Pool
-from .problems import Unexpected, reply_to_errors
-from .profile_job import KIND as PROFILE
-from .profile_job import profile_parameter
-from .readiness import Readiness
-from .recordings import Recordings
-from .services import Services, Viewers
-from .services_metrics import ServicesCollector
+from .recordings.recordings import Recordings
+from .routes.parts import EVERY_PART
 from .settings import Settings
-from .shares import Shares
-from .simulators import Simulators
-from .store import Store
-from .sweep_job import KIND as SWEEP
-from .sweep_job import sweep
-from .validation_job import KIND as VALIDATION
-from .validation_job import validation
-from .warmup import WarmUp, ready_to_simulate
+from .simulators.simulators import Simulators
+from .storage.store import Store
+from .web.callers import Callers
+from .web.draining import Drain, Draining
+from .web.heads import Heads
+from .web.heartbeat import beat
+from .web.interface import describe, operation_id
+from .web.metrics import Metrics
+from .web.observed import Observed
+from .web.pool import Pool
+from .web.problems import Unexpected, reply_to_errors
+from .web.readiness import Readiness
+from .web.services import Services, Viewers
+from .web.services_metrics import ServicesCollector
+from .web.shares import Shares
+from .work.campaign import KIND as CAMPAIGN
+from .work.campaign import campaign
+from .work.identification import KIND as IDENTIFICATION
+from .work.identification import identify_runs, of_recordings
+from .work.profile import KIND as PROFILE
+from .work.profile import profile_parameter
+from .work.sweep import KIND as SWEEP
+from .work.sweep import sweep
+from .work.validation import KIND as VALIDATION
+from .work.validation import validation
+from .work.warmup import WarmUp, ready_to_simulate
 
 log = logging.getLogger(__name__)
 
@@ -121,28 +104,10 @@ def create_app(
         generate_unique_id_function=operation_id,
         lifespan=lifespan,
     )
-    # Routes are looked for in this order: first what is asked for most.
-    for part in (
-        routes_health,
-        routes_simulations,
-        simulation_stream,
-        routes_sessions,
-        routes_catalogue,
-        routes_measurements,
-        routes_conditioning,
-        routes_mappings,
-        routes_identifications,
-        routes_sweeps,
-        routes_profiles,
-        routes_validations,
-        routes_advice,
-        routes_campaigns,
-        routes_page,
-        routes_metrics,
-    ):
-        app.include_router(part.router)
+    for part in EVERY_PART:
+        app.include_router(part)
     if find_spec(".viewer", __package__):
-        from .viewer import router
+        from .viewer.relay import router
 
         app.include_router(router)
     app.mount("/static", StaticFiles(directory=package_folder("static")))
@@ -245,7 +210,7 @@ def readers(limits: Limits, worked: Callable[[float, float], None]) -> Pool:
 def _viewers(limits: Limits) -> Viewers | None:
     if not find_spec(".viewer", __package__):
         return None
-    from .viewer import Viewers as Scenes
+    from .viewer.relay import Viewers as Scenes
 
     return Scenes(limits)
 

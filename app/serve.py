@@ -6,14 +6,14 @@ import socket
 import uvicorn
 
 from . import logs
+from .access.invitation import link, link_command, note_address
 from .addresses import in_brackets, is_loopback
-from .connection import connections
 from .errors import StartError
-from .invitation import link, link_command, note_address
 from .main import create_app
-from .server import CUT_OFF_SECONDS, Server
 from .settings import EVERY_ADDRESS, Settings
-from .store import Store
+from .storage.store import Store
+from .web.connection import connections
+from .web.server import CUT_OFF_SECONDS, Server
 
 FILES = 65_536
 WAITING = 1024

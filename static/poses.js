@@ -1,7 +1,7 @@
 // Where every part of the car is at one instant: pure arithmetic, no document, no server.
 //
 // Frame: X forward with its origin under the CG at rest (it travels with the car), Y left, Z up,
-// Z = 0 the flat ground. Body frame B and signs after ISO 8855. Nodes are those of app/scene.py. Motion is magnified about the state of rest: z, pitch, roll, arm angles,
+// Z = 0 the flat ground. Body frame B and signs after ISO 8855. Nodes are those of app/viewer/scene.py. Motion is magnified about the state of rest: z, pitch, roll, arm angles,
 // wheel heights and the road alike.
 
 const INBOARD = 0.19;

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 import yaml
 from distributed.cli import dask_scheduler, dask_worker
-from ridetune.app.dask_connection import CONFIGURATION
-from ridetune.app.origins import refusal
+from ridetune.app.access.origins import refusal
+from ridetune.app.jobs.dask_connection import CONFIGURATION
 from ridetune.app.settings import VARIABLES, Settings
 
 ROOT = Path(__file__).parents[1]

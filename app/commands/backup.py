@@ -5,9 +5,9 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from ..backup import Kept, back_up
-from ..restore import restore as restore_backup
 from ..settings import Settings
+from ..storage.backup import Kept, back_up
+from ..storage.restore import restore as restore_backup
 from .output import require_place, whole_file
 
 

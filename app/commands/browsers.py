@@ -3,8 +3,8 @@
 from argparse import Namespace
 from collections.abc import Sequence
 
-from ..browser_store import Browser, BrowserStore
 from ..settings import Settings
+from ..storage.browser_store import Browser, BrowserStore
 from .kept import kept, place
 from .output import minute, print_table
 

@@ -15,7 +15,7 @@ from ...engine.plant import Plant
 from ...engine.recording_files import files_of, files_of_car, names_of
 from ...engine.sensor_file import noisy, read_sensors
 from ...engine.sensors import SensorSet
-from ..plants import PLANTS
+from ..work.plants import PLANTS
 from .arguments import ArgumentError, band
 from .inputs import find_manoeuvre, find_vehicle, read_noise
 from .output import make_folder, refuse_input, refuse_to_overwrite, require_writable, whole_file

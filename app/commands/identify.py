@@ -15,7 +15,7 @@ from ...engine.identification.profile import Profile, profile, require_free
 from ...engine.parameters import DAMPER_NAMES, PARAMETER_NAMES, parameter
 from ...engine.run import Run
 from ...engine.vehicle import Vehicle
-from ..time_left import SearchClock
+from ..work.time_left import SearchClock
 from .arguments import bounds, loss, priors, rims_settings, sensors, whole
 from .arguments import starts as start_values
 from .inputs import (

@@ -3,11 +3,11 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from ..data_directory import is_used, make_private, usable
-from ..database import Database
 from ..errors import StartError
 from ..settings import Settings
-from ..store import database_beside
+from ..storage.data_directory import is_used, make_private, usable
+from ..storage.database import Database
+from ..storage.store import database_beside
 
 
 @contextmanager

@@ -4,8 +4,8 @@ import sys
 from argparse import Namespace
 from collections.abc import Sequence
 
-from ..key_store import Key, KeyStore
 from ..settings import Settings
+from ..storage.key_store import Key, KeyStore
 from .kept import kept, place
 from .output import minute, print_table
 

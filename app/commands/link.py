@@ -2,9 +2,9 @@
 
 from argparse import Namespace
 
-from .. import invitation
-from ..browser_store import BrowserStore
+from ..access import invitation
 from ..settings import Settings
+from ..storage.browser_store import BrowserStore
 from .kept import kept
 
 

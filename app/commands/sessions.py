@@ -3,10 +3,10 @@
 from argparse import Namespace
 from collections.abc import Sequence
 
-from ..file_store import FileStore
-from ..kept_sessions import KeptSession, KeptSessions
-from ..originals import Originals
 from ..settings import Settings
+from ..storage.file_store import FileStore
+from ..storage.kept_sessions import KeptSession, KeptSessions
+from ..storage.originals import Originals
 from .kept import kept, place
 from .output import minute, print_table
 

@@ -21,7 +21,7 @@ from ...engine.validation.geometry import Geometry, geometry_from_json
 from ...engine.validation.validate import ValidatedRun, Validation
 from ...engine.validation.validate import validate as predict
 from ...engine.validation.validation_file import validation_to_json
-from ..report import made, report
+from ..work.report import made, report
 from .arguments import ArgumentError, place_of, rims_settings, run_and_file
 from .identify import asked, fitted, print_fit
 from .inputs import (

@@ -15,11 +15,11 @@ from dask import config
 from distributed import LocalCluster
 from fastapi.testclient import TestClient
 from ridetune.app.cli import main
-from ridetune.app.dask_connection import CONFIGURATION
+from ridetune.app.jobs.dask_connection import CONFIGURATION
 from ridetune.app.limits import Limits
 from ridetune.app.main import create_app
 from ridetune.app.settings import Settings
-from ridetune.app.simulators import Simulators
+from ridetune.app.simulators.simulators import Simulators
 
 from .command_line import SHORT
 from .dask_processes import dask_processes

@@ -3,11 +3,11 @@
 from dataclasses import replace
 
 import pytest
-from ridetune.app import dispatcher, gatherer, jobs_under_way, lease_keeper
-from ridetune.app.dispatcher import Dispatcher
-from ridetune.app.job_kinds import PATIENT, Division, Kind
+from ridetune.app.jobs import dispatcher, gatherer, jobs_under_way, lease_keeper
+from ridetune.app.jobs.dispatcher import Dispatcher
+from ridetune.app.jobs.kinds import PATIENT, Division, Kind
 from ridetune.app.limits import Limits
-from ridetune.app.store import Store
+from ridetune.app.storage.store import Store
 
 from .stand_in_cluster import StandIn
 from .waiting import until

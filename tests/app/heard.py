@@ -3,7 +3,7 @@
 import queue
 
 import pytest
-from ridetune.app.worker import Ending
+from ridetune.app.jobs.worker import Ending
 
 PATIENCE = 60.0
 

@@ -54,7 +54,7 @@ def note(payload, attempt):
 
 def write(payload, attempt):
     """Make a file."""
-    from ridetune.app.worker import WithFile
+    from ridetune.app.jobs.worker import WithFile
 
     return WithFile({"rows": len(payload)}, payload)
 

@@ -4,11 +4,11 @@ import re
 
 import pytest
 from fastapi.testclient import TestClient
-from ridetune.app import session_store
 from ridetune.app.addresses import networks
 from ridetune.app.limits import Limits
 from ridetune.app.settings import Settings
-from ridetune.app.tables import browsers
+from ridetune.app.storage import session_store
+from ridetune.app.storage.tables import browsers
 from sqlalchemy import func, select
 
 from .conftest import ADDRESS, open_client
@@ -66,7 +66,7 @@ def test_who_was_not_let_in_gets_nothing_but_a_page_that_says_what_to_do(client,
 def test_nothing_is_read_of_who_was_not_let_in(client, monkeypatch, path, status):
     """4 MB of JSON are most of a second's work, which nobody should do for a stranger."""
     read = []
-    monkeypatch.setattr("ridetune.app.strict_json.loads", read.append)
+    monkeypatch.setattr("ridetune.app.routes.strict_json.loads", read.append)
     assert client.post(path, json={}).status_code == status
     assert client.post(path, content=b"").status_code == status
     assert read == []

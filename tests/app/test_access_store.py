@@ -1,12 +1,12 @@
 """Links, browsers, keys and owners as they are kept: what lets in, how long, and by whose word."""
 
 import pytest
-from ridetune.app import browser_store, key_store, session_store
-from ridetune.app.browser_store import BROWSER_SECONDS, LINK_SECONDS
 from ridetune.app.errors import Busy, Conflict, InvalidRequest, NotFound
 from ridetune.app.limits import Limits
-from ridetune.app.secret import hashed
-from ridetune.app.store import Store, database_beside
+from ridetune.app.storage import browser_store, key_store, session_store
+from ridetune.app.storage.browser_store import BROWSER_SECONDS, LINK_SECONDS
+from ridetune.app.storage.secret import hashed
+from ridetune.app.storage.store import Store, database_beside
 
 CAR = {"name": "a car"}
 

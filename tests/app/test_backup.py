@@ -9,15 +9,15 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
-import ridetune.app.backup
+import ridetune.app.storage.backup
 from ridetune.app.cli import main
-from ridetune.app.data_directory import DataDirectory
 from ridetune.app.errors import NotFound
 from ridetune.app.limits import Limits
-from ridetune.app.measurement import NewMeasurement
 from ridetune.app.setup_form import SetupForm
-from ridetune.app.store import Store
-from ridetune.app.tables import SCHEMA_VERSION
+from ridetune.app.storage.data_directory import DataDirectory
+from ridetune.app.storage.measurement import NewMeasurement
+from ridetune.app.storage.store import Store
+from ridetune.app.storage.tables import SCHEMA_VERSION
 from sqlalchemy import create_engine
 
 from .command_line import refused
@@ -171,13 +171,13 @@ def test_what_is_deleted_while_it_is_copied_is_left_out(tmp_path, command, monke
     store = Store(here, Limits())
     (one, other), _ = filled(store)
     before = picture(store, [other])
-    originals = ridetune.app.backup._originals
+    originals = ridetune.app.storage.backup._originals
 
     def deleted_by_then(*given):
         store.sessions.delete(one)
         return originals(*given)
 
-    monkeypatch.setattr("ridetune.app.backup._originals", deleted_by_then)
+    monkeypatch.setattr("ridetune.app.storage.backup._originals", deleted_by_then)
     command("", "backup", "--data", here, "-o", file)
     store.close()
     command("", "restore", file, "--data", there)

@@ -2,11 +2,11 @@
 
 import pytest
 from fastapi.testclient import TestClient
-from ridetune.app.buckets import Buckets
-from ridetune.app.callers import Callers, caller_of
 from ridetune.app.errors import Busy
 from ridetune.app.limits import Limits
 from ridetune.app.settings import Settings
+from ridetune.app.web.buckets import Buckets
+from ridetune.app.web.callers import Callers, caller_of
 from starlette.requests import Request
 
 from .conftest import ADDRESS, Visitor, open_client

@@ -6,11 +6,11 @@ import time
 import zipfile
 
 import pytest
-from ridetune.app.campaign_job import campaign, check_and_fill, drive_one, join_drives
+from ridetune.app.jobs.worker import Attempt, CutShort
 from ridetune.app.limits import Limits
 from ridetune.app.schemas import CampaignRequest
 from ridetune.app.settings import Settings
-from ridetune.app.worker import Attempt, CutShort
+from ridetune.app.work.campaign import campaign, check_and_fill, drive_one, join_drives
 from ridetune.engine.campaign import CAMPAIGN, Campaign, chosen, roughened
 from ridetune.engine.campaign_run import drive
 from ridetune.engine.detailed.car_file import reference_car

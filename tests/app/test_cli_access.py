@@ -11,9 +11,9 @@ import httpx2
 import pytest
 from ridetune.app.cli import main
 from ridetune.app.limits import Limits
-from ridetune.app.recent_answers import SECONDS
 from ridetune.app.settings import Settings
-from ridetune.app.store import Store
+from ridetune.app.storage.recent_answers import SECONDS
+from ridetune.app.storage.store import Store
 
 from .command_line import PROGRAM, refused
 from .conftest import open_client

@@ -6,8 +6,8 @@ import pytest
 from ridetune.app.cli import main
 from ridetune.app.errors import Unavailable
 from ridetune.app.limits import Limits
-from ridetune.app.measurement import NewMeasurement
-from ridetune.app.store import Store
+from ridetune.app.storage.measurement import NewMeasurement
+from ridetune.app.storage.store import Store
 
 from .command_line import refused
 

@@ -10,8 +10,8 @@ from contextlib import suppress
 import cloudpickle
 import psutil
 import pytest
-from ridetune.app.cluster import Cluster
-from ridetune.app.worker import MOST_KEPT
+from ridetune.app.jobs.cluster import Cluster
+from ridetune.app.jobs.worker import MOST_KEPT
 
 from . import tasks
 from .heard import PATIENCE, Heard, heard

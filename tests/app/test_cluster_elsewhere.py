@@ -5,8 +5,8 @@ import threading
 import cloudpickle
 import psutil
 import pytest
-from ridetune.app.cluster import Cluster
 from ridetune.app.errors import Unavailable
+from ridetune.app.jobs.cluster import Cluster
 
 from . import tasks
 from .dask_processes import DaskProcesses, make_certificates
@@ -103,7 +103,7 @@ def test_a_client_that_closes_itself_as_a_task_is_sent_is_replaced(
 def test_a_client_that_closes_itself_as_it_is_looked_at_is_replaced(
     tmp_path, heard, dask_processes, monkeypatch
 ):
-    monkeypatch.setattr("ridetune.app.cluster.LOOK_EVERY", 0.0)
+    monkeypatch.setattr("ridetune.app.jobs.cluster.LOOK_EVERY", 0.0)
     far = dask_processes
     cluster = Cluster(far.address, tmp_path, certificates=far.certificates)
     try:
@@ -184,7 +184,7 @@ def test_a_scheduler_that_stays_away_costs_no_more_each_time_it_is_tried(
     tmp_path, monkeypatch, caplog
 ):
     """Neither threads nor open files nor lines in the log, however long that lasts."""
-    monkeypatch.setattr("ridetune.app.dask_connection.CONNECT", 0.2)
+    monkeypatch.setattr("ridetune.app.jobs.dask_connection.CONNECT", 0.2)
     cluster = Cluster("tcp://127.0.0.1:9", tmp_path)
     assert is_away(cluster)  # Dask has threads that all its clients share
     threads, files = threading.active_count(), psutil.Process().num_fds()
@@ -192,6 +192,6 @@ def test_a_scheduler_that_stays_away_costs_no_more_each_time_it_is_tried(
         assert is_away(cluster)
     assert threading.active_count() <= threads
     assert psutil.Process().num_fds() <= files
-    told = [one.message for one in caplog.records if one.name == "ridetune.app.cluster"]
+    told = [one.message for one in caplog.records if one.name == "ridetune.app.jobs.cluster"]
     assert [message.partition(":")[0] for message in told] == ["cannot reach the workers at tcp"]
     cluster.close()

@@ -4,8 +4,8 @@ import json
 
 import numpy as np
 import pytest
-from ridetune.app.measurement import stated
-from ridetune.app.recordings import as_stated
+from ridetune.app.recordings.recordings import as_stated
+from ridetune.app.storage.measurement import stated
 from ridetune.engine.conditioning.chain import condition, steps_from_json
 from ridetune.engine.conditioning.kinds import steps_to_add
 from ridetune.engine.measurement import parse_run, read_run, run_to_csv

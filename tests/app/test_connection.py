@@ -5,9 +5,9 @@ import json
 
 import pytest
 from ridetune.app.addresses import networks
-from ridetune.app.bodies import Body
-from ridetune.app.connection import HEAD_BYTES, connections
 from ridetune.app.limits import Limits
+from ridetune.app.web.bodies import Body
+from ridetune.app.web.connection import HEAD_BYTES, connections
 from starlette.exceptions import HTTPException
 from uvicorn import Config
 from uvicorn.server import ServerState

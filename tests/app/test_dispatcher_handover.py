@@ -1,13 +1,13 @@
 """Who goes on with a job: another service or the next attempt, with what was kept of it."""
 
-from ridetune.app import jobs_under_way
 from ridetune.app.errors import Unavailable
-from ridetune.app.file_store import FileStore
-from ridetune.app.kept_sessions import KeptSessions
+from ridetune.app.jobs import jobs_under_way
 from ridetune.app.limits import Limits
-from ridetune.app.originals import Originals
-from ridetune.app.store import database_beside
-from ridetune.app.tables import jobs
+from ridetune.app.storage.file_store import FileStore
+from ridetune.app.storage.kept_sessions import KeptSessions
+from ridetune.app.storage.originals import Originals
+from ridetune.app.storage.store import database_beside
+from ridetune.app.storage.tables import jobs
 from sqlalchemy import update
 
 from .dispatcher_team import WIDTH, make

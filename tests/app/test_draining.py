@@ -14,9 +14,9 @@ import urllib.request
 from importlib.metadata import version
 
 import pytest
-from ridetune.app.draining import Drain, Draining
-from ridetune.app.notify import notify
-from ridetune.app.server import Server
+from ridetune.app.web.draining import Drain, Draining
+from ridetune.app.web.notify import notify
+from ridetune.app.web.server import Server
 from starlette.responses import StreamingResponse
 from uvicorn import Config
 

@@ -3,7 +3,7 @@
 import asyncio
 
 import pytest
-from ridetune.app.followers import Followers
+from ridetune.app.jobs.followers import Followers
 
 from .loop import in_a_loop
 

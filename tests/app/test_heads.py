@@ -1,7 +1,7 @@
 """HEAD, as watchers and `curl -I` send it. Oracle: RFC 9110, 9.3.2: the GET's head, no body."""
 
 import pytest
-from ridetune.app.tables import sessions
+from ridetune.app.storage.tables import sessions
 from sqlalchemy import func, select
 
 from .conftest import open_client

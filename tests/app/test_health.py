@@ -6,11 +6,11 @@ import threading
 from contextlib import contextmanager
 
 import pytest
-from ridetune.app import readiness
-from ridetune.app.draining import Draining
-from ridetune.app.readiness import Readiness
 from ridetune.app.settings import Settings
-from ridetune.app.warmup import WarmUp
+from ridetune.app.web import readiness
+from ridetune.app.web.draining import Draining
+from ridetune.app.web.readiness import Readiness
+from ridetune.app.work.warmup import WarmUp
 
 from .conftest import open_client
 from .loop import in_a_loop

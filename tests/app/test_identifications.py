@@ -10,11 +10,11 @@ import httpx2
 import psutil
 import pytest
 from ridetune.app.errors import OverBudget
-from ridetune.app.identification_job import as_asked, check_budget
-from ridetune.app.job_kinds import digest
+from ridetune.app.jobs.kinds import digest
 from ridetune.app.limits import Limits
 from ridetune.app.schemas import IdentificationRequest
 from ridetune.app.settings import Settings
+from ridetune.app.work.identification import as_asked, check_budget
 from ridetune.engine.identification.multistart import fits_of
 from ridetune.engine.measurement import read_run, run_to_csv
 from ridetune.engine.parameters import PARAMETER_NAMES

@@ -4,8 +4,8 @@ import re
 
 import pytest
 from ridetune.app import schemas, setup_form
-from ridetune.app.interface_shapes import EXAMPLES
 from ridetune.app.settings import Settings
+from ridetune.app.web.interface_shapes import EXAMPLES
 
 from tests.fuzz import interface
 

@@ -8,9 +8,9 @@ from functools import partial
 
 import pytest
 from ridetune.app.errors import NotFound, Unavailable
-from ridetune.app.job_store import JobStore
 from ridetune.app.limits import Limits
-from ridetune.app.owner_store import OwnerStore
+from ridetune.app.storage.job_store import JobStore
+from ridetune.app.storage.owner_store import OwnerStore
 
 from .conftest import Visitor
 from .owned_jobs import state, submit
@@ -84,7 +84,7 @@ def test_one_look_at_the_database_serves_all_followers(service, owner, clusters,
         return standing(store, some)
 
     monkeypatch.setattr(JobStore, "standing", look)
-    monkeypatch.setattr("ridetune.app.followers.POLL_EVERY", 3600.0)
+    monkeypatch.setattr("ridetune.app.jobs.followers.POLL_EVERY", 3600.0)
 
     async def states(followers) -> list[str]:
         return [found.state for found in await asyncio.gather(*map(anext, followers))]
@@ -142,7 +142,7 @@ def test_a_sessions_jobs_are_followed_so_often_at_once(service, owner, clusters,
 
 def test_followers_wait_for_a_database_that_is_away(service, owner, clusters, monkeypatch):
     """Whether it cannot tell how the job stands or whose it is."""
-    monkeypatch.setattr("ridetune.app.followers.POLL_EVERY", 0.01)
+    monkeypatch.setattr("ridetune.app.jobs.followers.POLL_EVERY", 0.01)
     job = submit(owner)["id"]
     assert owner.post(f"/identifications/{job}/cancel").status_code == 202
     away = [Unavailable("It is away.") for _ in range(4)]

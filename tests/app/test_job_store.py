@@ -2,10 +2,10 @@
 
 import pytest
 from ridetune.app.errors import Busy, NotFound
-from ridetune.app.job_leases import LEASE
 from ridetune.app.limits import Limits
-from ridetune.app.measurement import NewMeasurement
-from ridetune.app.store import Store
+from ridetune.app.storage.job_leases import LEASE
+from ridetune.app.storage.measurement import NewMeasurement
+from ridetune.app.storage.store import Store
 
 CAR = {"name": "a car"}
 

@@ -11,8 +11,8 @@ import pytest
 from fastapi import APIRouter
 from ridetune.app import logs
 from ridetune.app.logs import JsonLines, TextLines, about, tell
-from ridetune.app.pool import Pool
 from ridetune.app.settings import Settings
+from ridetune.app.web.pool import Pool
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from .conftest import ADDRESS, Visitor, open_client

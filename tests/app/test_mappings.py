@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 from ridetune.app.cli import main
-from ridetune.app.measurement import stated
-from ridetune.app.recordings import as_stated
+from ridetune.app.recordings.recordings import as_stated
+from ridetune.app.storage.measurement import stated
 from ridetune.engine.formats.child import ChildTable
 from ridetune.engine.mapping.mapping import read_mapping
 from ridetune.engine.mapping.reading import read_recording

@@ -7,7 +7,7 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
-from ridetune.app.measurement_view import measurement_to_json
+from ridetune.app.recordings.measurement_view import measurement_to_json
 from ridetune.engine.manoeuvre import manoeuvre_to_json, reference_manoeuvres
 from scipy.io import savemat
 

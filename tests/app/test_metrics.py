@@ -10,9 +10,9 @@ from fastapi.testclient import TestClient
 from prometheus_client.parser import text_string_to_metric_families
 from ridetune.app.errors import Unavailable
 from ridetune.app.main import create_app
-from ridetune.app.observed import METHODS
 from ridetune.app.settings import Settings
-from ridetune.app.tables import jobs
+from ridetune.app.storage.tables import jobs
+from ridetune.app.web.observed import METHODS
 from sqlalchemy import text, update
 from sqlalchemy.exc import OperationalError
 

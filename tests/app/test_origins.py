@@ -4,7 +4,7 @@ Oracle: RFC 6454, two pages are of one origin if scheme, host and port are the s
 """
 
 import pytest
-from ridetune.app.origins import refusal
+from ridetune.app.access.origins import refusal
 
 LOCAL = "127.0.0.1:8000"
 PUBLIC = "https://ride.example.com"

@@ -9,9 +9,9 @@ from collections.abc import Callable
 import pytest
 from ridetune.app.errors import Deleted, Unavailable
 from ridetune.app.limits import Limits
-from ridetune.app.recordings import Recordings
+from ridetune.app.recordings.recordings import Recordings
 from ridetune.app.settings import Settings
-from ridetune.app.store import Store
+from ridetune.app.storage.store import Store
 from sqlalchemy import event, text
 
 from .conftest import Visitor, open_client, short_recording
@@ -91,7 +91,7 @@ def test_a_database_that_breaks_off_within_a_transaction_keeps_nothing_of_it(
 
 
 def test_a_held_database_can_be_looked_at_and_is_written_again_later(settings, monkeypatch):
-    monkeypatch.setattr("ridetune.app.sqlite.BUSY_MILLISECONDS", 50)
+    monkeypatch.setattr("ridetune.app.storage.sqlite.BUSY_MILLISECONDS", 50)
     with open_client(settings) as service:
         owner = Visitor(service)
         car = car_of(owner, 1234.0)
@@ -122,11 +122,11 @@ DISKS = {
     "out of memory": (errno.ENOMEM, 503, "too little memory"),
 }
 PLACES = {
-    "flushing": "ridetune.app.originals.os.fsync",
-    "renaming": "ridetune.app.originals.os.replace",
-    "reading": "ridetune.app.recordings.NamedTemporaryFile",
+    "flushing": "ridetune.app.storage.originals.os.fsync",
+    "renaming": "ridetune.app.storage.originals.os.replace",
+    "reading": "ridetune.app.recordings.recordings.NamedTemporaryFile",
     "starting a reader": "ridetune.engine.formats.child.subprocess.Popen",
-    "receiving": "ridetune.app.uploads.SpooledTemporaryFile",
+    "receiving": "ridetune.app.routes.uploads.SpooledTemporaryFile",
 }
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from ridetune.app.errors import Busy, Unavailable
-from ridetune.app.pool import Pool
+from ridetune.app.web.pool import Pool
 
 from .loop import in_a_loop
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 from ridetune.app.errors import NotFound
 from ridetune.app.limits import Limits
-from ridetune.app.recordings import Recordings
+from ridetune.app.recordings.recordings import Recordings
 from ridetune.app.settings import Settings
 from ridetune.engine.errors import MeasurementError
 from ridetune.engine.formats import child

@@ -4,11 +4,11 @@ from itertools import count
 
 import pytest
 from ridetune.app.errors import NotFound
-from ridetune.app.key_store import KeyStore
 from ridetune.app.limits import Limits
-from ridetune.app.recent_answers import SECONDS, RecentAnswers
 from ridetune.app.settings import Settings
-from ridetune.app.store import Store, database_beside
+from ridetune.app.storage.key_store import KeyStore
+from ridetune.app.storage.recent_answers import SECONDS, RecentAnswers
+from ridetune.app.storage.store import Store, database_beside
 
 from .conftest import Visitor, open_client
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from ridetune.app import scene, shapes
+from ridetune.app.viewer import scene, shapes
 from ridetune.engine.frames import AXLES, CORNERS, side_of
 from ridetune.engine.vehicle_file import reference_vehicles
 

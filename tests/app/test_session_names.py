@@ -2,12 +2,12 @@
 
 import pytest
 from fastapi.testclient import TestClient
-from ridetune.app import session_store
 from ridetune.app.errors import Busy
 from ridetune.app.limits import Limits
 from ridetune.app.session_name import free_name, on_one_line
 from ridetune.app.settings import Settings
-from ridetune.app.store import Store
+from ridetune.app.storage import session_store
+from ridetune.app.storage.store import Store
 
 from .conftest import ADDRESS, Visitor, open_client
 

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 from ridetune.app.settings import Settings
-from ridetune.app.tables import sessions
+from ridetune.app.storage.tables import sessions
 from sqlalchemy import update
 
 from .conftest import Visitor, open_client
@@ -45,7 +45,7 @@ def test_the_list_tells_when_a_session_was_made_and_used_last(visitor):
 def test_a_first_session_does_not_wait_for_the_compiler():
     """numba takes seconds to load; the page answers while it does."""
     program = (
-        "import sys; from ridetune.app.samples import sample_project; sample_project();"
+        "import sys; from ridetune.app.work.samples import sample_project; sample_project();"
         "print('numba' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)

@@ -10,11 +10,11 @@ from contextlib import suppress
 from typing import Any
 
 import pytest
-from ridetune.app.data_directory import DataDirectory
 from ridetune.app.errors import Busy, InvalidRequest, NotFound, StartError
 from ridetune.app.limits import Limits
-from ridetune.app.measurement import NewMeasurement
-from ridetune.app.store import Store
+from ridetune.app.storage.data_directory import DataDirectory
+from ridetune.app.storage.measurement import NewMeasurement
+from ridetune.app.storage.store import Store
 
 from .postgresql_server import PostgresqlServer
 
@@ -296,7 +296,7 @@ def test_a_database_that_cannot_be_had_is_told_without_its_address(
 
 
 def test_a_missing_driver_is_named_with_its_remedy(tmp_path, monkeypatch):
-    monkeypatch.setattr("ridetune.app.postgresql.find_spec", lambda name: None)
+    monkeypatch.setattr("ridetune.app.storage.postgresql.find_spec", lambda name: None)
     with pytest.raises(StartError, match=r"needs psycopg; run .*\[postgresql\]"):
         Store(tmp_path, LIMITS, "postgresql://u@h/n")
 

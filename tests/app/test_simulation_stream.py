@@ -5,12 +5,13 @@ import json
 import threading
 
 import pytest
-from ridetune.app import simulation_stream, sockets
+from ridetune.app.access import sockets
 from ridetune.app.errors import NotFound
 from ridetune.app.limits import Limits
+from ridetune.app.routes import simulation_stream
+from ridetune.app.routes.simulation_stream import _Newest
 from ridetune.app.settings import Settings
-from ridetune.app.shares import Shares
-from ridetune.app.simulation_stream import _Newest
+from ridetune.app.web.shares import Shares
 from ridetune.engine.vehicle_file import reference_vehicles, vehicle_to_json
 from starlette.websockets import WebSocket, WebSocketDisconnect
 

@@ -14,12 +14,12 @@ from dataclasses import replace
 import psutil
 import pytest
 from ridetune.app import errors as of_service
-from ridetune.app import simulators as module
 from ridetune.app.errors import Busy, Unavailable
-from ridetune.app.lent_recordings import LentRecordings
-from ridetune.app.measurement import Measurement
-from ridetune.app.samples import sample_project
-from ridetune.app.simulators import Simulators
+from ridetune.app.recordings.lent import LentRecordings
+from ridetune.app.simulators import simulators as module
+from ridetune.app.simulators.simulators import Simulators
+from ridetune.app.storage.measurement import Measurement
+from ridetune.app.work.samples import sample_project
 from ridetune.engine.errors import RideError, SimulationDiverged
 from ridetune.engine.measurement import read_run
 from ridetune.engine.simulation.rims_settings import RimsSettings

@@ -10,11 +10,11 @@ import time
 from pathlib import Path
 
 import pytest
-from ridetune.app.data_directory import DataDirectory
 from ridetune.app.errors import Busy, Conflict, NotFound, StartError
 from ridetune.app.limits import Limits
-from ridetune.app.measurement import NewMeasurement
-from ridetune.app.store import Store
+from ridetune.app.storage.data_directory import DataDirectory
+from ridetune.app.storage.measurement import NewMeasurement
+from ridetune.app.storage.store import Store
 
 CAR = {"name": "a car"}
 
@@ -53,7 +53,7 @@ def test_the_lock_goes_with_its_process_however_it_ends(tmp_path):
     """kill -9 leaves nothing locked."""
     script = (
         "import sys, time; from pathlib import Path;"
-        "from ridetune.app.data_directory import DataDirectory;"
+        "from ridetune.app.storage.data_directory import DataDirectory;"
         "owner = DataDirectory(Path(sys.argv[1])); print('owned', flush=True); time.sleep(60)"
     )
     with subprocess.Popen(
@@ -77,7 +77,7 @@ def test_a_directory_that_may_not_be_written_is_told_at_the_start(tmp_path, monk
     """Oracle: access(2), which also knows of a file system that is mounted read-only."""
     Store(tmp_path, Limits(), database).close()
     with monkeypatch.context() as patch:
-        patch.setattr("ridetune.app.data_directory.os.access", lambda path, mode: False)
+        patch.setattr("ridetune.app.storage.data_directory.os.access", lambda path, mode: False)
         with pytest.raises(StartError, match="may not be written.*--data"):
             Store(tmp_path, Limits(), database)
     Store(tmp_path, Limits(), database).close()
@@ -189,7 +189,7 @@ def test_room_is_made_from_sessions_nobody_used(tmp_path, database, monkeypatch)
     store.sessions.set_vehicle(used, {"name": "mine"})
     looked, looked_token = store.sessions.create(CAR, [])
     now = time.time()
-    monkeypatch.setattr("ridetune.app.session_store.time.time", lambda: now + 7200.0)
+    monkeypatch.setattr("ridetune.app.storage.session_store.time.time", lambda: now + 7200.0)
     store.sessions.create(CAR, [])
     assert store.owners.opens(used, user=None, token=used_token)
     assert not store.owners.opens(looked, user=None, token=looked_token)

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 from pyarrow import feather, parquet
+from ridetune.app.jobs.worker import Attempt
 from ridetune.app.limits import Limits
 from ridetune.app.schemas import SweepRequest
 from ridetune.app.settings import Settings
-from ridetune.app.sweep_job import design_of, join_shares, most_bytes, sweep
-from ridetune.app.worker import Attempt
+from ridetune.app.work.sweep import design_of, join_shares, most_bytes, sweep
 from ridetune.engine.manoeuvre import reference_manoeuvres
 from ridetune.engine.simulation.excitation import FreeExcitation
 from ridetune.engine.sweeps.designs import Sobol

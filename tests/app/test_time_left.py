@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 from ridetune.app.commands.identify import progress_line
-from ridetune.app.time_left import SearchClock
+from ridetune.app.work.time_left import SearchClock
 from ridetune.engine.identification.fit import Progress, Stage
 
 

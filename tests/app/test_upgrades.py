@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 from ridetune.app.limits import Limits
 from ridetune.app.setup_form import SetupForm
-from ridetune.app.store import Store
-from ridetune.app.tables import SCHEMA_VERSION
+from ridetune.app.storage.store import Store
+from ridetune.app.storage.tables import SCHEMA_VERSION
 from sqlalchemy import create_engine, text
 
 from .old_databases import FILES, TOKEN, make, make_originals

@@ -5,11 +5,11 @@ import time
 import httpx2
 import msgspec
 import pytest
-from ridetune.app import sockets
+from ridetune.app.access import sockets
 from ridetune.app.errors import Busy, Unavailable
 from ridetune.app.limits import Limits
-from ridetune.app.viewer import Viewers, relay
-from ridetune.app.viser_servers import ADMISSION, HEADER
+from ridetune.app.viewer.relay import Viewers, relay
+from ridetune.app.viewer.viser_servers import ADMISSION, HEADER
 from ridetune.engine.vehicle_file import reference_vehicles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 from viser import __version__ as viser_version

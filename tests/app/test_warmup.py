@@ -5,10 +5,10 @@ import time
 
 import psutil
 import pytest
-from ridetune.app import warmup as module
 from ridetune.app.compile import PARTS, load_all
 from ridetune.app.errors import Compiling, Unavailable
-from ridetune.app.warmup import WarmUp
+from ridetune.app.work import warmup as module
+from ridetune.app.work.warmup import WarmUp
 from ridetune.engine.kernel_cache import is_compiled
 
 from .live import LiveService

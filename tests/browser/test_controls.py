@@ -1,7 +1,7 @@
 """Number fields, messages and how things look: what is typed, told and seen on the page."""
 
 import pytest
-from ridetune.app.scene import EDGES, GHOST
+from ridetune.app.viewer.scene import EDGES, GHOST
 
 pytestmark = pytest.mark.browser
 

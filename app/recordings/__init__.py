@@ -1,0 +1,1 @@
+"""Measurement files as runs: read once, summed up, shown, lent to the processes that simulate."""

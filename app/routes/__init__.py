@@ -1,0 +1,1 @@
+"""The REST interface and its websocket, one module a kind of thing."""

@@ -1,0 +1,1 @@
+"""The processes in which people's simulations run, and what happens in one of them."""

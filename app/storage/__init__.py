@@ -1,0 +1,1 @@
+"""What the service keeps: rows in a database, and files in the data directory."""

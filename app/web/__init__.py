@@ -1,0 +1,1 @@
+"""The server itself: connections, replies, problems, budgets, and what all handlers share."""
