@@ -8,7 +8,6 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from functools import partial
 from importlib.metadata import version
-from importlib.util import find_spec
 
 from fastapi import FastAPI
 from fastapi.staticfiles import StaticFiles
@@ -23,6 +22,8 @@ from .routes.parts import EVERY_PART
 from .settings import Settings
 from .simulators.simulators import Simulators
 from .storage.store import Store
+from .viewer.relay import Viewers
+from .viewer.relay import router as viewer
 from .web.callers import Callers
 from .web.draining import Drain, Draining
 from .web.heads import Heads
@@ -33,7 +34,7 @@ from .web.observed import Observed
 from .web.pool import Pool
 from .web.problems import Unexpected, reply_to_errors
 from .web.readiness import Readiness
-from .web.services import Services, Viewers
+from .web.services import Services
 from .web.services_metrics import ServicesCollector
 from .web.shares import Shares
 from .work.campaign import KIND as CAMPAIGN
@@ -106,10 +107,7 @@ def create_app(
     )
     for part in EVERY_PART:
         app.include_router(part)
-    if find_spec(".viewer", __package__):
-        from .viewer.relay import router
-
-        app.include_router(router)
+    app.include_router(viewer)
     app.mount("/static", StaticFiles(directory=package_folder("static")))
     app.openapi = describe(app)
     reply_to_errors(app)
@@ -177,7 +175,7 @@ def _services(
             settings.limits.session_streams,
             "The session has {} streams of simulations open; close one of its pages.",
         ),
-        viewers=_viewers(settings.limits),
+        viewers=Viewers(settings.limits),
     )
 
 
@@ -207,14 +205,6 @@ def readers(limits: Limits, worked: Callable[[float, float], None]) -> Pool:
     )
 
 
-def _viewers(limits: Limits) -> Viewers | None:
-    if not find_spec(".viewer", __package__):
-        return None
-    from .viewer.relay import Viewers as Scenes
-
-    return Scenes(limits)
-
-
 def _close(services: Services, *, lent: bool) -> None:
     """End the parts, those first that others serve; one that fails leaves none of them open.
 
@@ -222,8 +212,7 @@ def _close(services: Services, *, lent: bool) -> None:
     """
     with contextlib.ExitStack() as last_first:
         last_first.callback(services.store.close)
-        if services.viewers is not None:
-            last_first.callback(services.viewers.close)
+        last_first.callback(services.viewers.close)
         # Jobs are handed back once no request adds one any more.
         last_first.callback(services.jobs.close)
         last_first.callback(services.readers.close)
@@ -234,7 +223,7 @@ def _close(services: Services, *, lent: bool) -> None:
 
 
 async def _reap(services: Services) -> None:
-    while services.viewers is not None:
+    while True:
         await asyncio.sleep(services.settings.limits.unwatched_seconds / REAPS)
         with contextlib.suppress(Exception):
             await asyncio.to_thread(services.viewers.reap)

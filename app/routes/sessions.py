@@ -73,8 +73,7 @@ def rename(sid: SessionId, services: Shared, body: SessionNameForm) -> dict[str,
 def delete(request: Request, sid: SessionId, services: Shared, response: Response) -> None:
     """Remove the session with all it holds; what runs in it is cancelled."""
     services.jobs.cancel_all(sid)
-    if services.viewers is not None:
-        services.viewers.stop(sid)
+    services.viewers.stop(sid)
     services.store.sessions.delete(sid)
     cookies.forget_session(request, response, sid)
 

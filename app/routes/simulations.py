@@ -68,7 +68,7 @@ def content_of(
         services.settings.limits,
         charge=services.callers.simulating(sid, user),
     )
-    if shown is not None and services.viewers is not None:
+    if shown is not None:
         services.viewers.show(sid, shown)
     return found
 

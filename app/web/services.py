@@ -69,7 +69,7 @@ class Services:
     callers: Callers
     event_streams: Shares
     simulation_streams: Shares
-    viewers: Viewers | None = None
+    viewers: Viewers
 
     def in_simulator(
         self, sid: str, work: Callable[..., T], *given: Any, **answers: Callable[..., Any]

@@ -110,10 +110,8 @@ class ServicesCollector(Collector):
         ]
 
     def _watched(self) -> list[Metric]:
-        viewers = self._services.viewers
-        if viewers is None:
-            return []
-        return [_gauge("viewers", "3D scenes that are kept ready.", viewers.count())]
+        count = self._services.viewers.count()
+        return [_gauge("viewers", "3D scenes that are kept ready.", count)]
 
 
 def _gauge(name: str, told: str, value: float) -> Metric:
