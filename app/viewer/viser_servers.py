@@ -2,7 +2,7 @@
 
 viser listens on a loopback port and takes whoever connects: any process of this machine, and by its
 browser any page in the world. So each connection must bring a secret of this process before it is
-answered at all. viser 1.1.1 offers no such hook; tests/app/test_viewer.py holds it to this one.
+answered at all. viser 1.1.1 offers no such hook; tests of the relay hold it to this one.
 """
 
 import hmac

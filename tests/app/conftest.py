@@ -22,10 +22,10 @@ from ridetune.app.settings import Settings
 from ridetune.app.simulators.simulators import Simulators
 
 from .command_line import SHORT
-from .dask_processes import dask_processes
-from .dispatcher_team import team
-from .postgresql_server import on_postgresql, postgresql
-from .stand_in_cluster import clusters
+from .jobs.dask_processes import dask_processes
+from .jobs.dispatcher_team import team
+from .jobs.stand_in_cluster import clusters
+from .storage.postgresql_server import on_postgresql, postgresql
 
 __all__ = ["clusters", "dask_processes", "on_postgresql", "postgresql", "team"]
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ..app.dask_processes import DaskProcesses, dask_processes
-from ..app.postgresql_server import on_postgresql, postgresql
+from ..app.jobs.dask_processes import DaskProcesses, dask_processes
+from ..app.storage.postgresql_server import on_postgresql, postgresql
 from .conftest import AWAY, SAMPLES, Service, add_file, short_run
 
 __all__ = ["dask_processes", "on_postgresql", "postgresql"]
