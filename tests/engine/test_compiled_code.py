@@ -55,50 +55,57 @@ def drive_a_batch():
     rims_states(rows, prepare(run, vehicle), True)
 
 
-SPRING_FORCE = """
-import numpy as np
-from ridetune.engine.simulation.car_rows import car_row
-from ridetune.engine.simulation.integration import free_outputs
-from ridetune.engine.simulation.output_channels import corner_output
-from ridetune.engine.roads.road import Road
-from ridetune.engine.vehicle_file import reference_vehicles
+PROBE = """
+from typing import NamedTuple
 
-states = np.zeros((1, 16))
-states[0, 4] = 0.01
-row = car_row(reference_vehicles()["paper"])
-outputs = free_outputs(row, states, np.zeros((1, 16)), Road.flat())
-print(repr(float(corner_output(outputs, 0, "spring")[0])))
+from ridetune.engine.jit import compiled
+from ridetune.engine.kernels.forces import damper_slope
+
+
+class Damper(NamedTuple):
+    jounce_damping: float
+    rebound_damping: float
+    per_knee: float
+
+
+@compiled
+def in_rebound(damper):
+    return damper_slope(damper, -1.0)
+
+
+print(in_rebound(Damper(1200.0, 900.0, 0.0)), sum(in_rebound.stats.cache_hits.values()))
 """
 
 
 def test_an_edited_helper_counts_at_the_next_start(tmp_path):
-    """Oracle: arithmetic. A kernel calls a function of another file, whose edit doubles the spring
-    force; taking the edit back takes it back, from the first code still in the cache."""
+    """Oracle: arithmetic. What is compiled calls a function of another file, whose edit doubles the
+    damping; taking the edit back takes it back, from the first code still in the cache."""
     package, cache = tmp_path / "ridetune", tmp_path / "cache"
     for folder in engine.__path__:
         shutil.copytree(folder, package / "engine", ignore=shutil.ignore_patterns("__pycache__"))
     forces = package / "engine" / "kernels" / "forces.py"
     original = forces.read_text()
-    line = "spring = corner.preload + corner.stiffness * travel"
+    line = "return slope / (1.0 +"
     assert original.count(line) == 1
 
-    first = spring_force(tmp_path, cache)
-    forces.write_text(original.replace(line, line.replace("= ", "= 2.0 * (") + ")"))
-    assert np.isclose(spring_force(tmp_path, cache), 2.0 * first, rtol=1e-14)
+    (tmp_path / "probe.py").write_text(PROBE)
+    assert damping_in_rebound(tmp_path, cache) == ["900.0", "0"]
+    forces.write_text(original.replace(line, "return 2.0 * slope / (1.0 +"))
+    assert damping_in_rebound(tmp_path, cache) == ["1800.0", "0"]
     forces.write_text(original)
-    assert spring_force(tmp_path, cache) == first
+    assert damping_in_rebound(tmp_path, cache) == ["900.0", "1"]
     assert len(list(cache.iterdir())) == 2
 
 
-def spring_force(root: Path, cache: Path) -> float:
-    """What a new process with the package under a folder finds."""
+def damping_in_rebound(root: Path, cache: Path) -> list[str]:
+    """What a new process with the package under a folder finds, and how often in the cache."""
     environment = {**os.environ, "PYTHONPATH": str(root), "RIDETUNE_CACHE": str(cache)}
     done = subprocess.run(
-        [sys.executable, "-c", SPRING_FORCE],
+        [sys.executable, "-c", "import probe"],
         env=environment,
         cwd=root,
         capture_output=True,
         text=True,
         check=True,
     )
-    return float(done.stdout)
+    return done.stdout.split()
