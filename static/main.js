@@ -8,29 +8,29 @@
 // chart shows), zoomed(), clock, job(), validation(), campaign(),
 // profile(), advice(), idle() (no simulation under way) and unsaved().
 
-import * as advice from "./advice.js";
-import * as api from "./api.js";
-import * as bands from "./bands.js";
-import * as campaign from "./campaign.js";
-import * as car from "./car.js";
-import * as charts from "./charts.js";
-import * as comfort from "./comfort.js";
-import * as controls from "./controls.js";
-import { $, tabs } from "./dom.js";
-import * as identification from "./identification.js";
-import * as intake from "./intake.js";
-import * as keeping from "./keeping.js";
-import * as measurements from "./measurements.js";
-import { banner, build as buildNotices, notice, refused } from "./notices.js";
-import * as profile from "./profile.js";
-import * as projects from "./projects.js";
-import * as ride from "./ride.js";
-import * as scene from "./scene.js";
-import { idle, timing, want } from "./simulation.js";
-import { get, on, set } from "./store.js";
-import * as timeline from "./timeline.js";
-import * as units from "./units.js";
-import * as validation from "./validation.js";
+import * as campaign from "./campaign/campaign.js";
+import * as car from "./car/car.js";
+import * as controls from "./car/controls.js";
+import * as advice from "./fit/advice.js";
+import * as identification from "./fit/identification.js";
+import * as profile from "./fit/profile.js";
+import * as keeping from "./project/keeping.js";
+import * as projects from "./project/projects.js";
+import * as intake from "./recordings/intake.js";
+import * as measurements from "./recordings/measurements.js";
+import * as bands from "./ride/bands.js";
+import * as charts from "./ride/charts.js";
+import * as comfort from "./ride/comfort.js";
+import * as ride from "./ride/ride.js";
+import * as scene from "./ride/scene.js";
+import { idle, timing, want } from "./ride/simulation.js";
+import * as timeline from "./ride/timeline.js";
+import * as api from "./shared/api.js";
+import { $, tabs } from "./shared/dom.js";
+import { banner, build as buildNotices, notice, refused } from "./shared/notices.js";
+import { get, on, set } from "./shared/store.js";
+import * as units from "./shared/units.js";
+import * as validation from "./validation/validation.js";
 
 const RETRY = 1500;
 /** Height in which the twelve rows of a fit are seen at once, px; the 3D view's share by default. */

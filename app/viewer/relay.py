@@ -170,8 +170,8 @@ def _client_page() -> str:
 @router.get("/s/{sid}/viewer/", include_in_schema=False, dependencies=[Depends(opened_session)])
 def page() -> HTMLResponse:
     static = package_folder("static")
-    bridge = (static / "bridge.js").read_text(encoding="utf-8")
-    style = (static / "bridge.css").read_text(encoding="utf-8")
+    bridge = (static / "ride/bridge.js").read_text(encoding="utf-8")
+    style = (static / "ride/bridge.css").read_text(encoding="utf-8")
     head = f"<script>{bridge}</script><style>{style}</style>"
     html = _client_page().replace('<meta charset="utf-8" />', f'<meta charset="utf-8" />{head}', 1)
     # The client needs inline and evaluated script (WebAssembly glue). What must not happen is

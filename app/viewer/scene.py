@@ -1,7 +1,7 @@
 """The car and the road as viser nodes, in the design position.
 
 The parts are made here; the page moves them, because the ride is played in the browser. Node
-names, and what a part's pose means, are therefore shared with static/poses.js:
+names, and what a part's pose means, are therefore shared with static/ride/poses.js:
 
     /car/body                the sprung mass, origin at its CG, axes B
     /car/wheel_fl ...        a wheel, origin at its centre

@@ -1,12 +1,13 @@
 """A validation's report: one HTML file with its data, styles and scripts in it, and no network.
 
-The page's own modules draw it. A module that is inlined has no place that "./other.js" could be
-relative to, so each is named `ridetune/other.js` and an import map leads there.
+The page's own modules draw it. A module that is inlined has no place that "../shared/dom.js" could
+be relative to, so each is named `ridetune/shared/dom.js` and an import map leads there.
 """
 
 import base64
 import hashlib
 import json
+import posixpath
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
@@ -19,8 +20,8 @@ from ...engine.channels import CHANNELS
 from ...engine.parameters import ALL_PARAMETERS
 from ..package_files import package_folder
 
-ENTRY = "report.js"
-STYLES = ("vendor/uplot/uPlot.min.css", "report.css")
+ENTRY = "validation/report.js"
+STYLES = ("vendor/uplot/uPlot.min.css", "validation/report.css")
 PLOTS = "vendor/uplot/uPlot.iife.min.js"
 
 SHARP = (
@@ -39,7 +40,7 @@ scripts may run is told by the policy in the file itself."""
 CHANNEL_FIELDS = ("name", "label", "quantity", "unit", "display_unit", "display_factor", "sign")
 MADE_WITH = ("ridetune", "numpy", "scipy", "numba")
 
-_IMPORT = re.compile(r'((?:from|import) )"\./(\w+\.js)"')
+_IMPORT = re.compile(r'((?:from|import) )"(\.\.?/[\w/]+\.js)"')
 
 
 def report(document: Mapping[str, Any]) -> str:
@@ -105,9 +106,20 @@ def _modules(static: Path, entry: str) -> list[tuple[str, str]]:
         if name in found:
             continue
         text = (static / name).read_text(encoding="utf-8")
-        waiting += [other for _, other in _IMPORT.findall(text)]
-        found[name] = _IMPORT.sub(lambda match: f'{match[1]}"{_named(match[2])}"', text)
+        found[name], others = _by_name(text, posixpath.dirname(name))
+        waiting += others
     return sorted(found.items())
+
+
+def _by_name(text: str, folder: str) -> tuple[str, list[str]]:
+    """A module in a folder of static/ with its imports by name, and what these are in static/."""
+    others: list[str] = []
+
+    def named(match: re.Match[str]) -> str:
+        others.append(posixpath.normpath(posixpath.join(folder, match[2])))
+        return f'{match[1]}"{_named(others[-1])}"'
+
+    return _IMPORT.sub(named, text), others
 
 
 def _named(module: str) -> str:

@@ -92,7 +92,7 @@ def test_a_correlation_map_has_room_for_its_heads(visitor, count):
     visitor.click("#tab-identification")
     visitor.page.evaluate(
         """async (count) => {
-            const { view } = await import("/static/correlation.js");
+            const { view } = await import("/static/fit/correlation.js");
             const all = ridetune.state("parameters");
             const parameters = Array.from({ length: count }, (_, i) => all[i % all.length]);
             const correlation = parameters.map((_, i) => parameters.map((_, j) => Math.cos(i - j)));

@@ -39,7 +39,7 @@ def test_arms_keep_their_length_while_the_car_moves(driver):
     """
     lengths = in_module(
         driver,
-        "poses",
+        "ride/poses",
         """const at = (all, name) => all.find((x) => x.name === name && x.position).position;
         return a[0].map((t) => {
             const all = m.carMessages(ridetune.state("vehicle"), ridetune.state("now"), t, 1);
@@ -67,7 +67,7 @@ def test_an_arm_is_drawn_as_far_as_the_car(visitor, distance, angle, length):
     """Oracle: where the straight arm leaves the body's box; None: it does not."""
     drawn, marked, told = in_module(
         visitor,
-        "poses",
+        "ride/poses",
         """const v = structuredClone(ridetune.state("vehicle"));
         v.front.wheel.radius = 0.3;
         v.rear.cg_distance = 2.6 - v.front.cg_distance;
@@ -90,7 +90,7 @@ def test_wheels_touch_the_magnified_road(driver):
     """The tyre gives by load over stiffness: a few mm at most around its static compression."""
     gaps = in_module(
         driver,
-        "poses",
+        "ride/poses",
         """const run = ridetune.state("now");
         return [8, 11, 16].map((t) => {
             const where = m.locate(run.time, t);
@@ -114,7 +114,7 @@ def test_the_road_surface_has_the_height_under_the_wheels(driver):
     """
     differences = in_module(
         driver,
-        "road",
+        "ride/road",
         """const run = ridetune.state("now"), vehicle = ridetune.state("vehicle");
         const { vertices } = m.surface(vehicle, run);
         const columns = 6, out = [];
@@ -138,7 +138,7 @@ def test_a_dragged_pivot_is_where_the_sliders_say(visitor):
     """distance and angle from a point in B, and back by the model's definition."""
     found = in_module(
         visitor,
-        "poses",
+        "ride/poses",
         """const v = ridetune.state("vehicle"), h = v.chassis.cg_height;
         return [
             m.pivotAt(v, "front", [v.front.cg_distance - 1.7, 0, 1.7 * Math.tan(0.11) - h]),
@@ -152,7 +152,7 @@ def test_the_spectrum_holds_the_power_of_the_signal(visitor):
     """Oracle: a sine of amplitude 3 has power 4.5, wherever it lies; white noise its variance."""
     area, peak, noise, variance = in_module(
         visitor,
-        "spectrum",
+        "ride/spectrum",
         """const n = 2001, step = 0.01;
         const time = Float64Array.from({ length: n }, (_, i) => i * step);
         const sum = (s) => s.density.reduce((a, b) => a + b, 0) * s.frequency[0];
@@ -201,7 +201,7 @@ def test_sentences_of_the_service_are_said_in_the_pages_words(visitor, said, sho
     """Oracle: unit conversion by hand; 1 rad is 57.296 deg."""
     text = in_module(
         visitor,
-        "wording",
+        "shared/wording",
         """return m.worded(a[0]).map((part) => part.textContent ?? part).join("");""",
         said,
     )
@@ -216,7 +216,7 @@ def test_sentences_of_the_service_are_said_in_the_pages_words(visitor, said, sho
     ],
 )
 def test_a_logarithmic_axis_has_few_lines_at_powers_of_ten(visitor, low, high, lines):
-    found = in_module(visitor, "plots", "return m.decades(a[0], a[1]);", low, high)
+    found = in_module(visitor, "shared/plots", "return m.decades(a[0], a[1]);", low, high)
     assert found == pytest.approx(lines)
 
 
@@ -231,7 +231,7 @@ def test_a_logarithmic_axis_has_few_lines_at_powers_of_ten(visitor, low, high, l
 )
 def test_an_end_that_stands_alone_is_not_rounded_beyond_its_value(visitor, interval, shown):
     """A value of 13.96 at its bound is not "from 14.0"."""
-    assert in_module(visitor, "intervals", "return m.span(a[0], 1);", interval) == shown
+    assert in_module(visitor, "shared/intervals", "return m.span(a[0], 1);", interval) == shown
 
 
 @pytest.mark.parametrize("held", [{}, {"rear.stabilizer_bar.stiffness": ["d"]}, None])
@@ -240,7 +240,7 @@ def test_what_a_bound_decides_is_not_marked_as_what_runs_determine(visitor, held
     body = """const marked = [["d", "yes"], ["K", "yes"], ["C", "no"]].map(([name, determined]) =>
             m.mark({ name, determined }, { verdict: a[0] }));
         return marked.map(({ innerText, className, title }) => [innerText, className, title]);"""
-    well, other, not_at_all = in_module(visitor, "determined", body, {"conditions": held})
+    well, other, not_at_all = in_module(visitor, "shared/determined", body, {"conditions": held})
     assert other == ["well", "determined yes", "well determined"]
     assert not_at_all == ["not", "determined no", "not determined"]
     if held:
@@ -255,7 +255,7 @@ def test_a_view_that_fails_is_reported_and_nobody_else_s_affair(visitor):
     visitor.expect("the view's own mistake")
     seen = in_module(
         visitor,
-        "store",
+        "shared/store",
         """const seen = [];
         m.on("ofTheTest", () => { throw new Error("the view's own mistake"); });
         m.on("ofTheTest", () => seen.push(m.get("ofTheTest")));

@@ -32,8 +32,8 @@ def assert_shown_is_simulated_with_the_sliders(visitor):
     """Oracle: the same car by a request of its own."""
     shown, posted = visitor.page.evaluate(
         """async () => {
-            const api = await import("/static/api.js");
-            const { request } = await import("/static/simulation.js");
+            const api = await import("/static/shared/api.js");
+            const { request } = await import("/static/ride/simulation.js");
             const state = window.ridetune.state;
             const car = { vehicle: state("vehicle"), values: state("values") };
             const run = await api.simulate(request(car));
