@@ -7,7 +7,7 @@ timed, while they arrive.
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 
-from starlette.datastructures import Headers, MutableHeaders
+from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -21,7 +21,7 @@ PAGE_POLICY = (
     "img-src 'self' data: blob:; font-src 'self'; connect-src 'self'; frame-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-HEADERS = {
+_SAID = {
     "Content-Security-Policy": PAGE_POLICY,
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "same-origin",
@@ -30,6 +30,7 @@ HEADERS = {
     "Permissions-Policy": "camera=(), display-capture=(), geolocation=(), microphone=(), usb=()",
     "Cache-Control": "no-cache",
 }
+HEADERS = [(name.lower().encode(), value.encode()) for name, value in _SAID.items()]
 
 # A browser shows a refusal only if its upload was taken to the end: this much more is thrown away.
 DRAINED_BODIES = 10
@@ -110,9 +111,9 @@ def _announced(scope: Scope) -> int:
 def _with_headers(send: Send) -> Callable[[Message], Awaitable[None]]:
     async def with_headers(message: Message) -> None:
         if message["type"] == "http.response.start":
-            headers = MutableHeaders(scope=message)
-            for name, value in HEADERS.items():
-                headers.setdefault(name, value)
+            told = {name for name, _ in message["headers"]}
+            untold = [header for header in HEADERS if header[0] not in told]
+            message["headers"] = [*message["headers"], *untold]
         await send(message)
 
     return with_headers

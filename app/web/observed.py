@@ -11,7 +11,7 @@ import secrets
 import time
 from collections.abc import Callable
 
-from starlette.datastructures import Headers, MutableHeaders
+from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from .. import logs
@@ -21,6 +21,7 @@ from .route_template import route_of
 access = logging.getLogger("ridetune.access")
 
 REQUEST_ID = "X-Request-Id"
+_RAW_NAME = REQUEST_ID.lower().encode()
 _WELL_FORMED = re.compile(r"[A-Za-z0-9._-]{8,64}")
 _SESSION = re.compile(r"/(?:api/sessions|s)/([0-9a-f]{16})(?:/|$)")
 METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
@@ -63,7 +64,7 @@ class Observed:
             nonlocal status, sent
             if message["type"] == "http.response.start":
                 status = message["status"]
-                MutableHeaders(scope=message)[REQUEST_ID] = request
+                message["headers"] = [*message["headers"], (_RAW_NAME, request.encode())]
             else:
                 sent += len(message.get("body", b""))
             await send(message)
