@@ -15,13 +15,14 @@ const MOST_SAMPLES = 2001;
 const MEASURED_SAMPLES = 4001;
 /** Milliseconds from a run of "now" that is under way to the next. */
 const PACE = 25;
-const BUSY = 500;
+/** Milliseconds after which a refusal of this code is asked again by itself. */
+const PAUSES = { busy: 500, unavailable: 2000 };
 /** Codes of a service that does not simulate yet, or no more; the page waits until one does. */
 const AWAY = ["compiling", "draining"];
 
 const wanted = { now: false, reference: false, measured: false, scene: false };
 const underWay = { now: 0, reference: 0, alone: 0 };
-/** How many runs were refused as too many, and wait until they may be asked for again. */
+/** How many runs were refused for the moment, and wait until they may be asked for again. */
 let refused = 0;
 let sequence = 0;
 /** When a run of "now" was asked for last, and what asks for the next. */
@@ -113,14 +114,20 @@ async function perform(kind, work) {
     }
     if (error.lost) set({ online: false });
     else if (AWAY.includes(error.code)) set({ ready: false });
-    else if (error.code === "busy") {
-      refused += 1;
-      await new Promise((done) => setTimeout(done, BUSY));
-      refused -= 1;
-    } else set({ trouble: error });
+    else {
+      // A session that is busy asked too much itself: there is nothing to tell.
+      if (error.code !== "busy") set({ trouble: error });
+      if (error.code in PAUSES) await pause(PAUSES[error.code]);
+    }
   }
   underWay[kind] -= 1;
   begin();
+}
+
+async function pause(milliseconds) {
+  refused += 1;
+  await new Promise((done) => setTimeout(done, milliseconds));
+  refused -= 1;
 }
 
 async function measured() {
@@ -180,7 +187,7 @@ async function retried(name, work) {
   try {
     return await work();
   } catch (error) {
-    if (error.lost || error.code === "busy" || AWAY.includes(error.code)) wanted[name] = true;
+    if (error.lost || error.code in PAUSES || AWAY.includes(error.code)) wanted[name] = true;
     throw error;
   }
 }

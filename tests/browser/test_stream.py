@@ -142,6 +142,25 @@ def test_where_too_much_is_asked_for_the_page_asks_less_often(visit, service):
     assert_shown_is_simulated_with_the_sliders(visitor)
 
 
+def test_what_the_service_cannot_do_just_now_is_told_and_asked_again(visit, service):
+    sentence = "The service is busy with 80 simulations; try again in a moment."
+    refusals = []
+
+    def refuse(socket, message):
+        if refusals:
+            socket.send(json.dumps(refusals.pop() | {"seq": json.loads(message)["seq"]}))
+            return True
+        return False
+
+    visitor = intercepted(visit, service, refuse)
+    refusals.append({"status": 503, "code": "unavailable", "detail": sentence})
+    before = visitor.look("ridetune.state('now').head.seq")
+    visitor.page.evaluate(MOVE, [0.5, 1])
+    visitor.until(f"ridetune.state('trouble')?.message === {json.dumps(sentence)}")
+    visitor.until(f"ridetune.state('now').head.seq > {before} && !ridetune.state('trouble')")
+    assert_shown_is_simulated_with_the_sliders(visitor)
+
+
 @pytest.mark.slow
 def test_a_websocket_that_falls_silent_is_given_up(visit, service):
     """As after a laptop's sleep: what is sent goes nowhere, and nobody says so."""
