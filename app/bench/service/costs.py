@@ -14,7 +14,7 @@ from .connection import FRAMES, Connection
 from .figure import Figure, Measured
 from .pace import Pace
 from .subject import Subject, Visitor
-from .work import asked_once, ended, identification, move, moved, sweep, vehicle_of
+from .work import asked_once, ended, head_of, identification, move, moved, sweep, vehicle_of
 
 IDLE_SESSIONS, IDLE_TARGET = 200, 1e9
 UNWATCHED_SECONDS = 2.0
@@ -79,7 +79,7 @@ async def _opened(subject: Subject, visitor: Visitor) -> Tab:
         connection.close()
     moves = await subject.socket(f"/api/sessions/{visitor.id}/simulations", visitor)
     await moves.send(json.dumps(moved(vehicle, 0)))
-    await moves.recv()
+    head_of(await moves.recv())
     scene = await subject.socket(f"/s/{visitor.id}/viewer", visitor, f"viser-v{version('viser')}")
     await scene.recv()
     return moves, scene

@@ -56,8 +56,10 @@ def moved(vehicle: Mapping[str, Any], number: int, **more: Any) -> dict[str, Any
     }
 
 
-def head_of(reply: bytes) -> dict[str, Any]:
-    """What a simulation's reply in frames tells before its histories."""
+def head_of(reply: str | bytes) -> dict[str, Any]:
+    """What a simulation's reply tells before its histories; `Unexpected` where it is a problem."""
+    if isinstance(reply, str):
+        raise Unexpected(f"The service answered a move with {reply[:300]}.")
     (length,) = struct.unpack_from("<I", reply)
     return json.loads(reply[4 : 4 + length])
 
