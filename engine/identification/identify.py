@@ -20,6 +20,7 @@ from ..channels import WHEEL_CHANNELS
 from ..errors import ProblemError
 from ..simulation.initial_state import swings_in
 from ..simulation.simulate import rims_batch
+from .batches import Simulate
 from .cars import mixed_plants
 from .compared_runs import ComparedRun
 from .ended_search import EndedSearch
@@ -53,7 +54,7 @@ from .noise_rounds import with_found_noise
 from .offers import offers
 from .prior_checks import disagreements, prior_checks
 from .problem import FreeParameter, Problem
-from .residuals import FAILED_TRIAL, Residuals, Simulate
+from .residuals import FAILED_TRIAL, Residuals
 from .search import Found, Search
 from .search_settings import MOST_STARTS
 from .uncertainty import information, uncertainty

@@ -27,8 +27,9 @@ from ..errors import ProblemError
 from ..parameters import parameter
 from ..simulation.simulate import rims_batch
 from ..units import after_number, listed
+from .batches import Simulate
 from .problem import FreeParameter, Problem
-from .residuals import Residuals, Simulate
+from .residuals import Residuals
 from .search import Found, Search
 from .uncertainty import DIRECTION_TOLERANCE, information, uncertainty
 from .variables import AT_BOUND

@@ -26,30 +26,24 @@ residual: finite, so that the trust region shrinks and the search goes on.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..channels import INPUT_CHANNELS, OUTPUT_CHANNELS
-from ..errors import Cancelled
 from ..filters import in_band
-from ..kernels.lanes import BATCH
 from ..simulation.car_rows import car_row
 from ..simulation.comparison import fit_percent
 from ..simulation.rims import RimsInputs
-from ..simulation.simulate import Traction
 from ..simulation.stability import check_rims_step
+from .batches import Batches, Simulate
 from .condensed import triangle
 from .problem import Problem
 from .sensing import IDEAL, driven, reading_slope, sensed
 from .uncertainty import Information, RunResiduals
 
 Array = NDArray[np.float64]
-Simulate = Callable[[Array, RimsInputs, Traction], Array]
-"""(cars (C, CAR_ROWS), inputs, traction) -> (C, samples, 3); a failed car is not a number."""
-
 Histories = Mapping[str, Array]
 """By run, of z, pitch and roll: (samples, 3), or (cars, samples, 3)."""
 
@@ -69,18 +63,6 @@ lie where the loss has flattened out."""
 
 FAILED_TRIAL = 1e8
 """Residual of a failed car, in units of the noise."""
-
-CAR_STEPS_AT_ONCE = 400_000
-"""Cars times steps in one batch: 16 numbers each, about 50 MB."""
-
-LANES = len(BATCH)
-"""Cars the simulation works on side by side; a batch is cut at multiples of it."""
-
-RUNS_AT_ONCE = 2
-"""Batches of different runs under way together: one fills the cores when another ends."""
-
-LOOK_EVERY = 0.05
-"""Seconds between two looks at `cancelled`; a batch under way then ends unseen."""
 
 
 def check_start(problem: Problem) -> None:
@@ -112,7 +94,7 @@ class Residuals:
     """Residual vector and Jacobian of a problem, with a count of the simulations behind them.
 
     simulate : the rims mode for a batch of cars
-    cancelled : polled every LOOK_EVERY seconds; true raises Cancelled
+    cancelled : polled all the while; true raises Cancelled
     Raises what `check_start` does.
     """
 
@@ -122,9 +104,7 @@ class Residuals:
         check_start(problem)
         self.problem = problem
         self.lower, self.upper = np.array([one.ends for one in problem.variables]).T
-        self.simulations = 0
-        self._simulate = simulate
-        self._cancelled = cancelled
+        self._batches = Batches(simulate, cancelled)
         self._last: tuple[Array, Array, Histories] | None = None
         self._quick: tuple[Array, Array] | None = None
         at_sensors = list(enumerate(problem.fitted, start=len(problem.free)))
@@ -135,6 +115,11 @@ class Residuals:
         self._priors = [(one, places[one.name]) for one in problem.priors]
 
     @property
+    def simulations(self) -> int:
+        """How often a car was simulated through a run."""
+        return self._batches.simulations
+
+    @property
     def starts_between(self) -> tuple[Array, Array]:
         """Between what a search may begin, each (n,)."""
         room = OFF_BOUNDS * (self.upper - self.lower)
@@ -142,7 +127,7 @@ class Residuals:
 
     def of(self, problem: Problem) -> "Residuals":
         """Those of another problem with the same model, under the same watch."""
-        return Residuals(problem, self._simulate, self._cancelled)
+        return Residuals(problem, self._batches.simulate, self._batches.cancelled)
 
     def blocks(self) -> list[Block]:
         """The blocks of the residual vector, in order."""
@@ -340,7 +325,10 @@ class Residuals:
             if not len(possible):
                 continue
             cars = cars[np.isfinite(cars).all(axis=1)]
-            histories = self._histories(cars, self._inputs(trials[possible[0]]))
+            inputs = self._inputs(trials[possible[0]])
+            simulated = self._batches.histories(cars, inputs, self.problem.traction)
+            names = (seen.name for seen in self.problem.runs)
+            histories = dict(zip(names, simulated, strict=True))
             for block in blocks:
                 model = histories[block.run][:, :, OUTPUT_CHANNELS.index(block.channel)]
                 read = self._read(block, model, [trials[k] for k in possible])
@@ -382,42 +370,6 @@ class Residuals:
             histories = sensed(block.time, histories, readings)
         return np.where(fine, self._filtered(block.time, histories), np.nan)
 
-    def _histories(self, cars: Array, inputs: Sequence[RimsInputs]) -> Histories:
-        """By run (cars, samples, 3); the runs side by side, looking at `cancelled`."""
-        pool = ThreadPoolExecutor(RUNS_AT_ONCE)
-        try:
-            parts = [
-                [
-                    pool.submit(self._simulate, some, of_run, self.problem.traction)
-                    for some in _parts(cars, len(of_run.node_time))
-                ]
-                for of_run in inputs
-            ]
-            pending = {future for run in parts for future in run}
-            while pending:
-                self._stop_if_cancelled()
-                pending = wait(pending, LOOK_EVERY).not_done
-            self.simulations += len(cars) * len(parts)
-            done = ([future.result() for future in run] for run in parts)
-            return {
-                seen.name: np.concatenate(of_run)
-                for seen, of_run in zip(self.problem.runs, done, strict=True)
-            }
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
-
     def _filtered(self, time: Array, values: Array) -> Array:
         """Histories (..., samples) through the output filter."""
         return in_band(time, values.T, self.problem.settings.output_band).T
-
-    def _stop_if_cancelled(self) -> None:
-        if self._cancelled is not None and self._cancelled():
-            raise Cancelled(
-                f"The identification was cancelled after {self.simulations} simulations."
-            )
-
-
-def _parts(cars: Array, nodes: int) -> list[Array]:
-    """The cars in batches that keep memory flat on long runs."""
-    at_once = LANES * max(1, CAR_STEPS_AT_ONCE // (LANES * nodes))
-    return [cars[k : k + at_once] for k in range(0, len(cars), at_once)]
