@@ -31,6 +31,11 @@ def mixed_plants(plants: Mapping[str, str]) -> list[str]:
     if len(runs) < 2:
         return []
     told = "; ".join(_driven(plant, names) for plant, names in runs.items())
+    if len(runs.keys() - {""}) < 2:
+        return [
+            f"Whether the runs are of one car is not known: {told}. Add the notes of those that"
+            " have none, or use those of one car together."
+        ]
     return [
         f"The runs are of different cars, whatever the vehicle is called: {told}. Use those of one"
         " car together."
@@ -43,6 +48,7 @@ def among_others(name: str, plants: Mapping[str, str]) -> list[str]:
 
 
 def _driven(plant: str, names: list[str]) -> str:
+    if not plant:
+        return f"nothing tells what drove {', '.join(names)}"
     verb = "was" if len(names) == 1 else "were"
-    by = f"driven by the {plant} car of a campaign" if plant else "measured, as far as is known"
-    return f"{', '.join(names)} {verb} {by}"
+    return f"{', '.join(names)} {verb} driven by the {plant} car of a campaign"

@@ -87,8 +87,9 @@ function ofAnother(run) {
     return h("span", { className: "hint" }, "recorded with another car: ", run.vehicle);
   }
   const [first] = fitted();
-  return first && ofAnotherPlant(run, first)
-    ? h("span", { className: "hint" }, "another car than that fitted: ", drivenBy(run)) : null;
+  if (!first || !ofAnotherPlant(run, first)) return null;
+  const sure = run.plant && first.plant ? "" : "perhaps ";
+  return h("span", { className: "hint" }, `${sure}another car than that fitted: ${drivenBy(run)}`);
 }
 
 function select(options, value, change, properties) {

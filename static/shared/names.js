@@ -28,11 +28,11 @@ export function nameOf(id) {
 /** Whether a recording is known to be of another car than the one of that name. */
 export const ofAnotherCar = ({ vehicle }, name) => Boolean(vehicle) && vehicle !== name;
 
-/** Whether two recordings are of different cars, whatever their vehicle is called: measured, or of a campaign. */
+/** Whether two recordings may be of different cars, whatever their vehicle is called. */
 export const ofAnotherPlant = (run, other) => (run.plant ?? "") !== (other.plant ?? "");
 
 /** What drove in a recording. */
-export const drivenBy = ({ plant }) => (plant ? `driven by the ${plant} car of a campaign` : "measured, as far as is known");
+export const drivenBy = ({ plant }) => (plant ? `driven by the ${plant} car of a campaign` : "nothing tells what drove it");
 
 /** Why a recording is of no use for identification. */
 export const lacks = (row) => row.needs_mapping

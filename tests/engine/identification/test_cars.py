@@ -23,8 +23,17 @@ def test_runs_of_one_plant_are_not_told_of():
 
 def test_one_sentence_names_the_runs_by_what_drove_them():
     (said,) = mixed_plants({"a.csv": "", "b.csv": "concept", "c.csv": "", "d.csv": "detailed"})
-    assert "a.csv, c.csv were measured, as far as is known; b.csv was driven by the con" in said
+    assert ": nothing tells what drove a.csv, c.csv; b.csv was driven by the concept car of" in said
     assert "d.csv was driven by the detailed car of a campaign. Use those of one car" in said
+
+
+def test_a_run_of_which_nothing_is_told_is_not_said_to_be_of_another_car():
+    (said,) = mixed_plants({"a.csv": "detailed", "b.csv": ""})
+    assert said == (
+        "Whether the runs are of one car is not known: a.csv was driven by the detailed car of a"
+        " campaign; nothing tells what drove b.csv. Add the notes of those that have none, or use"
+        " those of one car together."
+    )
 
 
 def test_a_fit_and_the_advice_after_it_warn_of_a_virtual_run_among_measured_ones():
