@@ -181,8 +181,8 @@ class Verdict:
     parameters : by "yes", "weakly" and "no", their names
     combinations : that the runs determine better than their parameters
     directions : axes of the covariance, the least determined first
-    conditions : by what is at a bound, the parameters and combinations that are determined and
-        would be elsewhere without it
+    conditions : by what is at a bound, or is the rebound ratio of a damper that is taken for
+        linear, the parameters and combinations that are determined and would be elsewhere without
     sentences : the same for a person
     """
 

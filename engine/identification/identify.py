@@ -49,6 +49,7 @@ from .fit_findings import (
     undetermined_findings,
     well_driven,
 )
+from .linear_dampers import freed_ratios
 from .multistart import refined_starts, spread
 from .noise_rounds import with_found_noise
 from .offers import offers
@@ -59,7 +60,7 @@ from .search import Found, Search
 from .search_settings import MOST_STARTS
 from .uncertainty import information, uncertainty
 from .verdict import verdict, without_verdict
-from .whiteness import whiteness, whiteness_findings
+from .whiteness import far_from_white, whiteness, whiteness_findings
 
 __all__ = ["Fit", "FreeParameter", "Outcome", "Problem", "Progress", "identify"]
 
@@ -151,6 +152,9 @@ def identify(
     judged = without_verdict(parameters)
     if converged:
         released = _released(solution, [*parameters, *sensors], problem)
+        if far_from_white(tests):
+            at_bound = np.array([one.at_bound for one in (*parameters, *sensors)])
+            released |= freed_ratios(residuals, solution, at_bound)
         judged = verdict(parameters, errors, vehicle, released)
     warnings = [
         *(warning for seen in problem.runs for warning in seen.warnings),

@@ -12,12 +12,12 @@ PART_OF_APART of what these errors would give were they independent, sqrt(sum (g
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..parameters import ALL_NAMES, parameter
+from ..parameters import ALL_NAMES, DAMPER_NAMES, parameter
 from ..units import after_number, in_percent, listed
 from ..vehicle import Vehicle
 from .combinations import COMBINATIONS, Combination
@@ -49,7 +49,8 @@ def verdict(
 
     errors : of the search's variables;  vehicle : at the solution
     released : by the title of what is at a bound, how far the variables (n,) would go were it
-        further away (`Found.released`)
+        further away (`Found.released`), and by that of a rebound ratio of 1 were it free
+        (`freed_ratios`)
     """
     classes = by_class(estimates)
     names = [one.name for one in estimates]
@@ -65,15 +66,16 @@ def verdict(
         and (estimate := _held_together(one, gradients[one.name], estimates, errors, vehicle))
     ]
     conditions = _conditions(estimates, combined, gradients, errors, released or {})
+    linear = [name for name in conditions if name in DAMPER_NAMES and name not in names]
     return Verdict(
         parameters=classes,
         combinations=tuple(combined),
         directions=tuple(_directions(names, errors, gradients)),
         conditions=conditions,
         sentences=(
-            *_of_parameters(classes, conditions),
+            *_of_parameters(classes, conditions, linear),
             *(
-                _of_combination(one, classes["yes"], conditions)
+                _of_combination(one, classes["yes"], conditions, linear)
                 for one in _news(combined, gradients, estimates)
             ),
         ),
@@ -207,7 +209,8 @@ def _conditions(
     errors: Uncertainty,
     released: Mapping[str, Array],
 ) -> dict[str, tuple[str, ...]]:
-    """What holds others, that are determined, to where they are by its bound, and which.
+    """What holds others, that are determined, to where they are by its bound or by being 1, and
+    which.
 
     One that drifts along what the runs leave open leaves the rest where it is.
     """
@@ -225,12 +228,20 @@ def _conditions(
     return {name: moved for name, moved in moved_by.items() if moved}
 
 
-def _condition(of: Sequence[str], conditions: Mapping[str, Sequence[str]]) -> str:
-    """On which bounds some of what is determined hangs: "if ... is where its bound puts it"."""
-    holding = [_short(name) for name, moved in conditions.items() if {*moved} & {*of}]
-    one = len(holding) == 1
-    where = "is where its bound puts it" if one else "are where their bounds put them"
-    return f"if {listed(holding)} {where}"
+def _condition(
+    of: Sequence[str], conditions: Mapping[str, Sequence[str]], linear: Collection[str]
+) -> str:
+    """On what some of what is determined hangs: "if ... is where its bound puts it".
+
+    linear : those of the conditions that are no bounds but dampers' being linear
+    """
+    holding = [name for name, moved in conditions.items() if {*moved} & {*of}]
+    bounds = [_short(name) for name in holding if name not in linear]
+    where = "is where its bound puts it" if len(bounds) == 1 else "are where their bounds put them"
+    parts = [f"{listed(bounds)} {where}"] if bounds else []
+    if len(bounds) < len(holding):
+        parts.append("the dampers are linear")
+    return f"if {' and '.join(parts)}"
 
 
 def _short(name: str) -> str:
@@ -239,7 +250,9 @@ def _short(name: str) -> str:
 
 
 def _of_parameters(
-    classes: Mapping[str, Sequence[str]], conditions: Mapping[str, Sequence[str]]
+    classes: Mapping[str, Sequence[str]],
+    conditions: Mapping[str, Sequence[str]],
+    linear: Collection[str],
 ) -> list[str]:
     wording = {
         "yes": "Determined to better than 15 %",
@@ -255,14 +268,17 @@ def _of_parameters(
         if bound:
             head = "" if free else f"{said}, "
             symbols = ", ".join(map(_short, bound))
-            parts.append(f"{head}{_condition(bound, conditions)}: {symbols}")
+            parts.append(f"{head}{_condition(bound, conditions, linear)}: {symbols}")
         if parts:
             sentences.append(f"{'; '.join(parts)}.")
     return sentences
 
 
 def _of_combination(
-    one: CombinationEstimate, known: Sequence[str], conditions: Mapping[str, Sequence[str]]
+    one: CombinationEstimate,
+    known: Sequence[str],
+    conditions: Mapping[str, Sequence[str]],
+    linear: Collection[str],
 ) -> str:
     apart = [parameter(name).symbol for name in one.of if name not in known]
     low, high = one.confidence_interval
@@ -273,6 +289,6 @@ def _of_combination(
         told = f"{one.value:.4g}{unit} to {in_percent(half_width / abs(one.value))}"
     are = "are determined only together" if len(apart) > 1 else "is determined better"
     if any(one.name in moved for moved in conditions.values()):
-        told += f", {_condition([one.name], conditions)}"
+        told += f", {_condition([one.name], conditions, linear)}"
     label = f"{one.label[0].lower()}{one.label[1:]}"
     return f"{listed(apart)} {are}, as {one.symbol}, the {label}: {told}."

@@ -11,7 +11,7 @@ once and takes no number of lags. Where the outputs are filtered, only frequenci
 leaves alone count.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,19 +72,23 @@ def whiteness(
     return found
 
 
-def whiteness_findings(tests: tuple[Whiteness, ...], free: Collection[str] = ()) -> list[str]:
-    """A sentence where residuals are far from white.
-
-    free : the parameters' names; what the model could still be given is what is not among them
-    """
-    coloured = [
+def far_from_white(tests: Iterable[Whiteness]) -> list[Whiteness]:
+    """Those of channels in which the model misses more than noise."""
+    return [
         one
         for one in tests
         if one.p < DOUBTFUL
         and one.effective_samples < FEW_EFFECTIVE * one.samples
         and one.rms > LEAST_RMS
     ]
-    if not coloured:
+
+
+def whiteness_findings(tests: tuple[Whiteness, ...], free: Collection[str] = ()) -> list[str]:
+    """A sentence where residuals are far from white.
+
+    free : the parameters' names; what the model could still be given is what is not among them
+    """
+    if not (coloured := far_from_white(tests)):
         return []
     where: dict[str, list[str]] = {}
     for one in coloured:

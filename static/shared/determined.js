@@ -12,14 +12,24 @@ export const DETERMINED = {
 
 /**
  * "if rear bar stiffness is where its bound puts it" of a parameter or combination, or nothing; fits of
- * earlier versions have no conditions.
+ * earlier versions have no conditions. One that was not looked for is that of a damper taken for linear.
  */
 export function condition(of, result) {
-  const held = Object.entries(result.verdict.conditions ?? {}).filter(([, moved]) => moved.includes(of))
-    .map(([name]) => units.parameter(name)?.label.toLowerCase() ?? name);
-  if (!held.length) return "";
-  return `if ${held.join(" and ")} ${held.length > 1 ? "are where their bounds put them" : "is where its bound puts it"}`;
+  const holding = Object.entries(result.verdict.conditions ?? {}).filter(([, moved]) => moved.includes(of))
+    .map(([name]) => name);
+  const bounds = holding.filter((name) => isFound(name, result))
+    .map((name) => units.parameter(name)?.label.toLowerCase() ?? name);
+  const said = [];
+  if (bounds.length) {
+    said.push(`${bounds.join(" and ")} ${bounds.length > 1 ? "are where their bounds put them" : "is where its bound puts it"}`);
+  }
+  if (bounds.length < holding.length) said.push("the dampers are linear");
+  return said.length ? `if ${said.join(" and ")}` : "";
 }
+
+/** Whether a fit looked for what goes by a name: a parameter, or, of which there is no table, a sensor. */
+const isFound = (name, { parameters }) =>
+  !units.parameter(name) || parameters.some((one) => one.name === name);
 
 /** How well a parameter or combination is determined, marked. */
 export function mark({ name, determined: word }, result) {

@@ -234,18 +234,33 @@ def test_an_end_that_stands_alone_is_not_rounded_beyond_its_value(visitor, inter
     assert in_module(visitor, "shared/intervals", "return m.span(a[0], 1);", interval) == shown
 
 
-@pytest.mark.parametrize("held", [{}, {"rear.stabilizer_bar.stiffness": ["d"]}, None])
-def test_what_a_bound_decides_is_not_marked_as_what_runs_determine(visitor, held):
+BAR, RATIO = "rear.stabilizer_bar.stiffness", "front.suspension.rebound_ratio"
+BY_A_BOUND = "rear stabilizer bar stiffness is where its bound puts it"
+
+
+@pytest.mark.parametrize(
+    ("held", "said"),
+    [
+        ({}, ""),
+        (None, ""),
+        ({BAR: ["d"]}, f"if {BY_A_BOUND}"),
+        ({RATIO: ["d"]}, "if the dampers are linear"),
+        ({BAR: ["d"], RATIO: ["d", "e"]}, f"if {BY_A_BOUND} and the dampers are linear"),
+    ],
+)
+def test_what_a_bound_decides_is_not_marked_as_what_runs_determine(visitor, held, said):
     """A fit of an earlier version tells no conditions."""
     body = """const marked = [["d", "yes"], ["K", "yes"], ["C", "no"]].map(([name, determined]) =>
-            m.mark({ name, determined }, { verdict: a[0] }));
+            m.mark({ name, determined }, { verdict: a[0], parameters: [{ name: a[1] }] }));
         return marked.map(({ innerText, className, title }) => [innerText, className, title]);"""
-    well, other, not_at_all = in_module(visitor, "shared/determined", body, {"conditions": held})
+    well, other, not_at_all = in_module(
+        visitor, "shared/determined", body, {"conditions": held}, BAR
+    )
     assert other == ["well", "determined yes", "well determined"]
     assert not_at_all == ["not", "determined no", "not determined"]
     if held:
         assert well[:2] == ["well, if …", "determined yes conditional"]
-        assert well[2].endswith("if rear stabilizer bar stiffness is where its bound puts it")
+        assert well[2] == f"well determined, {said}"
     else:
         assert well == ["well", "determined yes", "well determined"]
 

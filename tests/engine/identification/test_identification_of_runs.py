@@ -108,6 +108,26 @@ def test_the_identified_car_squats_over_the_road_as_the_detailed_one_does(detail
     assert found["8dof"].scores["chassis.pitch"].fit_percent > 90.0
 
 
+def test_what_linear_dampers_bend_is_told_to_hang_on_them(detailed):
+    """Oracle: the detailed car's geometry, far outside the intervals of a fit to one run."""
+    vehicle, drive, _ = detailed
+    fit = identify(Problem.build(vehicle, [drive]))
+    rear = json.loads((SAMPLES / "detailed/geometry.json").read_text())["rear"]
+    true = {f"rear.pivot.{name}": value for name, value in rear.items()}
+    missed = {
+        one.name
+        for one in fit.parameters
+        if one.name in true
+        and one.determined == "yes"
+        and not one.confidence_interval[0] < true[one.name] < one.confidence_interval[1]
+    }
+    conditions = fit.verdict.conditions
+    hanging = {name for ratio in DAMPER_NAMES for name in conditions.get(ratio, ())}
+    assert missed == {"rear.pivot.distance", "rear.pivot.angle"}
+    assert missed <= hanging
+    assert "; if the dampers are linear: " in fit.verdict.sentences[0]
+
+
 def test_braking_beside_driving_shows_where_the_pivots_lie(detailed):
     """Oracle: the instant centres of the detailed car's geometry.
 

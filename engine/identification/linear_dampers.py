@@ -1,0 +1,55 @@
+"""What of a fit hangs on the dampers being linear, as the vehicle has them.
+
+Dampers with more force in rebound than in jounce pull the body down on a rough road; a fit to
+linear ones takes that for the doing of what else moves the body so, such as the pivots.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..frames import AXLES
+from ..parameters import RATIO_BOUNDS
+from .residuals import Residuals
+from .search import RELEASED, Found
+from .uncertainty import DIRECTION_TOLERANCE
+from .variables import FreeParameter
+
+Array = NDArray[np.float64]
+
+LINEAR = 1.0
+"""Rebound ratio of a linear damper."""
+
+
+def freed_ratios(residuals: Residuals, found: Found, held: NDArray[np.bool_]) -> dict[str, Array]:
+    """How far the parameters' variables (n,) would go by the Gauss-Newton step, were the rebound
+    ratio of one axle's linear damper free, too; by its path. That goes RELEASED far at most.
+
+    held : what is at a bound, of all that the fit looked for, and stays there
+    """
+    problem, n = residuals.problem, len(found.x)
+    names = [f"{axle}.suspension.rebound_ratio" for axle in AXLES]
+    free = {one.name for one in problem.free}
+    kept = [
+        name
+        for axle, name in zip(AXLES, names, strict=True)
+        if name not in free and problem.vehicle.axle(axle).suspension.linear
+    ]
+    if not kept:
+        return {}
+    ratios = tuple(FreeParameter(name, LINEAR, *RATIO_BOUNDS) for name in kept)
+    wider = residuals.of(replace(problem, free=(*problem.free, *ratios)))
+    of_car = len(problem.free)
+    x = np.insert(found.x, of_car, [one.variable(LINEAR) for one in ratios])
+    rows, root = wider.reweighted(x, found.residuals)
+    jacobian = wider.reweighted_slopes(wider.jacobian(x), root)
+    places = range(of_car, of_car + len(kept))
+    others = np.delete(np.arange(n + len(kept)), places)[~held]
+    steps = {}
+    for name, place in zip(kept, places, strict=True):
+        moved = [*others, place]
+        step = np.zeros(n + len(kept))
+        step[moved] = -np.linalg.lstsq(jacobian[:, moved], rows, rcond=DIRECTION_TOLERANCE)[0]
+        steps[name] = step[:of_car] * RELEASED / max(abs(step[place]), RELEASED)
+    return steps
