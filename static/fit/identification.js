@@ -19,6 +19,8 @@ import * as setup from "./setup.js";
 
 let holdouts = {};
 let view = "setup";
+/** Whether a fit is being asked for. */
+let sending = false;
 let hooks = {};
 const { now: current, busy, start: send, resume: takeUp, cancel } = jobs("identifications", "identification",
   { changed: show, progressed: advance, ended });
@@ -93,8 +95,12 @@ async function request() {
 }
 
 async function start() {
-  if (![ready, search.ready, priors.ready, sensors.ready].every((one) => one()) || !await send(request)) return;
-  view = "fit";
+  if (![ready, search.ready, priors.ready, sensors.ready].every((one) => one())) return;
+  sending = true;
+  press();
+  const taken = await send(request);
+  sending = false;
+  if (taken) view = "fit";
   show();
 }
 
@@ -145,8 +151,6 @@ async function scoreHoldouts() {
 function show() {
   const panel = $("#identification");
   const running = busy();
-  $("#identify").disabled = running;
-  $("#identify").textContent = running ? "Identifying …" : "Identify";
   inPlace(panel, () => panel.replaceChildren(
     h("div", { className: "switch", role: "group", "aria-label": "Identification" },
       step("setup", "Set-up"), step("fit", "Fit"),
@@ -160,7 +164,16 @@ function show() {
     view === "setup" ? setup.view(show) : fit.view(current(), holdouts, { ...hooks, offer }),
   ), "#start, #cancel");
   saidOfRuns();
+  press();
   advance();
+}
+
+/** The buttons that begin a fit, while one is sent or under way. */
+function press() {
+  const waits = sending || busy();
+  for (const button of [$("#identify"), $("#start")].filter(Boolean)) {
+    Object.assign(button, { disabled: waits, textContent: waits ? "Identifying …" : "Identify" });
+  }
 }
 
 /** Which runs a press on Identify fits. */

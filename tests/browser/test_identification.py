@@ -41,7 +41,12 @@ def test_a_fit_that_has_just_begun_says_one_thing(visitor):
 
     visitor.page.route("**/identifications", begun)
     visitor.page.route("**/events", lambda route: None)
-    visitor.click("#identify")
+    pressed = visitor.page.evaluate("""() => {
+        const [button, below] = ["#identify", "#start"].map((one) => document.querySelector(one));
+        button.click();
+        return [button.textContent, button.disabled, below.disabled];
+    }""")
+    assert pressed == ["Identifying …", True, True], "before the service has answered"
     visitor.until("ridetune.job() !== null")
     assert visitor.element("#outcome").inner_text() == "Starting the fit …"
     assert visitor.element("#cost-now").inner_text() == ""
