@@ -54,6 +54,11 @@ def listed(words: Sequence[str]) -> str:
     return f"{', '.join(words[:-1])}{' and ' if words[1:] else ''}{words[-1]}"
 
 
+def counted(count: int, noun: str) -> str:
+    """ "1 step", "2 steps"."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
 _PLAIN_NUMBER = {"", "-", "1"}
 
 _ALIASES = {

@@ -5,6 +5,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from ...engine.units import counted
 from ..settings import Settings
 from ..storage.backup import Kept, back_up
 from ..storage.restore import restore as restore_backup
@@ -31,8 +32,8 @@ def restore(options: argparse.Namespace) -> None:
 
 def _told(kept: Kept) -> str:
     return (
-        f"{kept.sessions} sessions with {kept.measurements} measurements and {kept.jobs} jobs, "
-        f"{kept.files} files of {kept.bytes / 1e6:.1f} MB"
+        f"{counted(kept.sessions, 'session')} with {counted(kept.measurements, 'measurement')} and "
+        f"{counted(kept.jobs, 'job')}, {counted(kept.files, 'file')} of {kept.bytes / 1e6:.1f} MB"
     )
 
 

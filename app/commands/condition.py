@@ -13,6 +13,7 @@ from ...engine.known_band import output_highpass
 from ...engine.measurement import missing_for_identification, run_to_csv
 from ...engine.run import Run
 from ...engine.run_notes import notes_beside, notes_of, read_notes
+from ...engine.units import counted
 from .arguments import ArgumentError
 from .inputs import find_mapping, find_vehicle, read_one, recording_files
 from .output import OutputError, print_warnings, require_place, write_file
@@ -37,8 +38,7 @@ def condition(options: Namespace) -> None:
     for record in done.conditioning[len(run.conditioning) :]:
         print(f"{record.step['kind']}: {' '.join(record.sentences)}")
         print_warnings(record.warnings)
-    count = f"{len(steps)} step{'' if len(steps) == 1 else 's'}"
-    print(f"{count}, {done.time.size} samples over {done.duration:.4g} s.")
+    print(f"{counted(len(steps), 'step')}, {done.time.size} samples over {done.duration:.4g} s.")
     _print_use(done, suggestion)
     if options.output:
         write_file(options.output, run_to_csv(done))
