@@ -2,7 +2,7 @@
 
 import * as measurements from "../recordings/measurements.js";
 import * as api from "../shared/api.js";
-import { $, counted, h } from "../shared/dom.js";
+import { $, counted, h, when } from "../shared/dom.js";
 import { refused } from "../shared/notices.js";
 import { get, on, set } from "../shared/store.js";
 import * as keeping from "./keeping.js";
@@ -85,14 +85,12 @@ const isOpen = ({ id }) => id === get("session");
 function row(one) {
   const doingIt = doing?.id === one.id ? doing.what : null;
   const name = doingIt === "rename" ? renaming(one) : h("bdi", { className: "strong" }, one.name);
-  const facts = `${isOpen(one) ? "open here" : `used ${local(one.seen)}`}, ${counted(one.measurement_count, "recording")}`;
+  const facts = `${isOpen(one) ? "open here" : `used ${when(one.seen)}`}, ${counted(one.measurement_count, "recording")}`;
   return h("li", { "aria-current": isOpen(one) ? "true" : undefined },
     h("div", { className: "grow" }, name, h("p", { className: "soft" }, facts)),
     ...(doingIt ? [] : tools(one)),
     doingIt === "delete" ? deleting(one) : null);
 }
-
-const local = (instant) => new Date(instant).toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
 
 const button = (text, one, act, props = {}) =>
   h("button", { type: "button", "aria-label": `${text} ${one.name}`, on: { click: act }, ...props }, text);

@@ -4,7 +4,7 @@
 import { choose } from "../ride/ride.js";
 import { settled } from "../ride/simulation.js";
 import * as api from "../shared/api.js";
-import { $, breakable, capital, h, inPlace } from "../shared/dom.js";
+import { $, breakable, capital, h, inPlace, when } from "../shared/dom.js";
 import { Misplaced, RECORDINGS, kindOfJson, requireNotes } from "../shared/file_kinds.js";
 import { dataOf, drivenBy, lacks, nameOf, original } from "../shared/names.js";
 import { notice } from "../shared/notices.js";
@@ -235,7 +235,7 @@ function origin(row) {
   const first = original(row);
   if (first) return `the same data as ${nameOf(first.id)}`;
   return row.sample ? "sample"
-    : `added ${new Date(row.created).toLocaleString([], { dateStyle: "short", timeStyle: "short" })}`;
+    : `added ${when(row.created)}`;
 }
 
 /** What is doubtful in a file; that its columns are not mapped is no doubt, and comes first. */

@@ -24,6 +24,9 @@ export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 /** "1 step", "2 steps". */
 export const counted = (count, noun) => `${count} ${noun}${count === 1 ? "" : "s"}`;
 
+/** An instant of the service as this browser tells date and time. */
+export const when = (instant) => new Date(instant).toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
+
 /** Hand a file to the visitor: a blob, or data to be written as JSON. */
 export function saveFile(content, name) {
   const blob = content instanceof Blob ? content
