@@ -11,6 +11,11 @@
 import * as campaign from "./campaign/campaign.js";
 import * as car from "./car/car.js";
 import * as controls from "./car/controls.js";
+import * as api from "./common/api.js";
+import { $, tabs } from "./common/dom.js";
+import { banner, build as buildNotices, notice, refused } from "./common/notices.js";
+import { get, on, set } from "./common/store.js";
+import * as units from "./common/units.js";
 import * as advice from "./fit/advice.js";
 import * as identification from "./fit/identification.js";
 import * as profile from "./fit/profile.js";
@@ -25,11 +30,6 @@ import * as ride from "./ride/ride.js";
 import * as scene from "./ride/scene.js";
 import { idle, timing, want } from "./ride/simulation.js";
 import * as timeline from "./ride/timeline.js";
-import * as api from "./shared/api.js";
-import { $, tabs } from "./shared/dom.js";
-import { banner, build as buildNotices, notice, refused } from "./shared/notices.js";
-import { get, on, set } from "./shared/store.js";
-import * as units from "./shared/units.js";
 import * as validation from "./validation/validation.js";
 
 const RETRY = 1500;

@@ -14,7 +14,7 @@ LAYERS = (
     {"recordings"},
     {"ride"},
     {"car"},
-    {"shared"},
+    {"common"},
 )
 """From the top down; a folder imports only from those below it, and within itself."""
 

@@ -1,7 +1,7 @@
 """A validation's report: one HTML file with its data, styles and scripts in it, and no network.
 
-The page's own modules draw it. A module that is inlined has no place that "../shared/dom.js" could
-be relative to, so each is named `ridetune/shared/dom.js` and an import map leads there.
+The page's own modules draw it. A module that is inlined has no place that "../common/dom.js" could
+be relative to, so each is named `ridetune/common/dom.js` and an import map leads there.
 """
 
 import base64

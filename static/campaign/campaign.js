@@ -1,15 +1,15 @@
 // A campaign: let a car that is known drive manoeuvres, follow the job, take its recordings over.
 
 import { take } from "../car/car.js";
+import * as api from "../common/api.js";
+import { fold, h, inPlace } from "../common/dom.js";
+import { jobs, queued } from "../common/job.js";
+import { nameOf, ofAnotherPlant } from "../common/names.js";
+import { notice, refused } from "../common/notices.js";
+import { get, on, set } from "../common/store.js";
+import * as units from "../common/units.js";
 import { fitToo, fitted } from "../fit/setup.js";
 import { deleted } from "../recordings/measurements.js";
-import * as api from "../shared/api.js";
-import { fold, h, inPlace } from "../shared/dom.js";
-import { jobs, queued } from "../shared/job.js";
-import { nameOf, ofAnotherPlant } from "../shared/names.js";
-import { notice, refused } from "../shared/notices.js";
-import { get, on, set } from "../shared/store.js";
-import * as units from "../shared/units.js";
 import * as form from "./campaign_form.js";
 
 const STATES = { whole: "whole", partial: "broke off", missing: "missing" };

@@ -1,10 +1,10 @@
 // The form of a campaign: which car drives what, on which roads, and what records it.
 
 import { withValues } from "../car/controls.js";
-import * as api from "../shared/api.js";
-import { fold, h, inPlace } from "../shared/dom.js";
-import { get, on, set } from "../shared/store.js";
-import * as units from "../shared/units.js";
+import * as api from "../common/api.js";
+import { fold, h, inPlace } from "../common/dom.js";
+import { get, on, set } from "../common/store.js";
+import * as units from "../common/units.js";
 
 /** Chosen until somebody chooses: the paper's manoeuvres. */
 const USUAL = ["1", "2"];

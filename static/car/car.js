@@ -1,10 +1,10 @@
 // The car's known data: another reference car, a file, or single numbers.
 
-import * as api from "../shared/api.js";
-import { $, fileName, h, saveFile } from "../shared/dom.js";
-import { notice, refused } from "../shared/notices.js";
-import { get, on, set } from "../shared/store.js";
-import * as units from "../shared/units.js";
+import * as api from "../common/api.js";
+import { $, fileName, h, saveFile } from "../common/dom.js";
+import { notice, refused } from "../common/notices.js";
+import { get, on, set } from "../common/store.js";
+import * as units from "../common/units.js";
 import { ofBentDamper, valueAt, valuesOf, withValues } from "./controls.js";
 
 const GROUPS = [["chassis", "Sprung mass"], ["front", "Front axle"], ["rear", "Rear axle"],

@@ -3,12 +3,12 @@
 // The truth is `values` of the store (SI); a slider shows it, clamped to its range. On each track
 // lie the baseline (a tick) and, after a fit, the 95 % interval of the identified value (a band).
 
-import { condition, DETERMINED } from "../shared/determined.js";
-import { $, capital, h, symbol } from "../shared/dom.js";
-import { isKnown, span } from "../shared/intervals.js";
-import { notice } from "../shared/notices.js";
-import { get, on, set } from "../shared/store.js";
-import * as units from "../shared/units.js";
+import { condition, DETERMINED } from "../common/determined.js";
+import { $, capital, h, symbol } from "../common/dom.js";
+import { isKnown, span } from "../common/intervals.js";
+import { notice } from "../common/notices.js";
+import { get, on, set } from "../common/store.js";
+import * as units from "../common/units.js";
 
 const GROUPS = { front: "Front axle", rear: "Rear axle" };
 const THUMB = 14;

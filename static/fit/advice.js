@@ -1,10 +1,10 @@
 // What to drive next: manoeuvres ranked by what a run of each would do to the errors of a fit.
 
-import * as api from "../shared/api.js";
-import { h } from "../shared/dom.js";
-import { formula, symbolOf } from "../shared/formula.js";
-import { get, set } from "../shared/store.js";
-import * as units from "../shared/units.js";
+import * as api from "../common/api.js";
+import { h } from "../common/dom.js";
+import { formula, symbolOf } from "../common/formula.js";
+import { get, set } from "../common/store.js";
+import * as units from "../common/units.js";
 
 /** Ends of the bars' scale, standard error over value. */
 const LEAST = 1e-3;

@@ -1,8 +1,8 @@
 // How the errors of a fit's parameters hang together: a heat map, and the pairs that trade.
 
-import { counted, h } from "../shared/dom.js";
-import { formula, symbolOf } from "../shared/formula.js";
-import * as units from "../shared/units.js";
+import { counted, h } from "../common/dom.js";
+import { formula, symbolOf } from "../common/formula.js";
+import * as units from "../common/units.js";
 
 /** Correlation from which two parameters are hardly known apart. */
 const STRONG = 0.9;

@@ -1,7 +1,7 @@
 // The cost over the steps of a fit, on a logarithmic scale.
 
-import { h } from "../shared/dom.js";
-import { AXIS, decadeLabels, decades, fitWidth } from "../shared/plots.js";
+import { h } from "../common/dom.js";
+import { AXIS, decadeLabels, decades, fitWidth } from "../common/plots.js";
 
 /** {element, show(history)}. */
 export function costChart(height) {

@@ -1,6 +1,6 @@
 // The views of a fit that is done: what was found, what it is worth, and what to drive next.
 
-import { h } from "../shared/dom.js";
+import { h } from "../common/dom.js";
 import * as advice from "./advice.js";
 import * as correlation from "./correlation.js";
 import * as profile from "./profile.js";

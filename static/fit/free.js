@@ -2,10 +2,10 @@
 
 import { damperNames, holdDampers } from "../car/car.js";
 import { holds, ofBentDamper, titleOf } from "../car/controls.js";
-import * as api from "../shared/api.js";
-import { h, symbol } from "../shared/dom.js";
-import { get, on, set } from "../shared/store.js";
-import * as units from "../shared/units.js";
+import * as api from "../common/api.js";
+import { h, symbol } from "../common/dom.js";
+import { get, on, set } from "../common/store.js";
+import * as units from "../common/units.js";
 import * as priors from "./priors.js";
 import * as sensors from "./sensors_form.js";
 

@@ -1,13 +1,13 @@
 // Identification: start a fit as set up, follow it, hand its result on.
 
 import { withValues } from "../car/controls.js";
+import * as api from "../common/api.js";
+import { $, h, inPlace } from "../common/dom.js";
+import { jobs } from "../common/job.js";
+import { nameOf } from "../common/names.js";
+import { notice } from "../common/notices.js";
+import { get, on, set } from "../common/store.js";
 import { brakingOf, ready, rimsOf } from "../ride/preparation.js";
-import * as api from "../shared/api.js";
-import { $, h, inPlace } from "../shared/dom.js";
-import { jobs } from "../shared/job.js";
-import { nameOf } from "../shared/names.js";
-import { notice } from "../shared/notices.js";
-import { get, on, set } from "../shared/store.js";
 import * as fit from "./fit.js";
 import * as free from "./free.js";
 import * as priors from "./priors.js";

@@ -1,8 +1,8 @@
 // What is known of parameters before the runs: a mean and a standard deviation each.
 
-import { fold, h, symbol } from "../shared/dom.js";
-import { get, set } from "../shared/store.js";
-import * as units from "../shared/units.js";
+import { fold, h, symbol } from "../common/dom.js";
+import { get, set } from "../common/store.js";
+import * as units from "../common/units.js";
 
 const memory = { open: false };
 

@@ -1,15 +1,15 @@
 // The profile likelihood of one parameter of a fit: how much worse the fit gets when it is held
 // elsewhere and all others are fitted anew.
 
-import * as api from "../shared/api.js";
-import { h } from "../shared/dom.js";
-import { symbolOf } from "../shared/formula.js";
-import { span } from "../shared/intervals.js";
-import { jobs, queued } from "../shared/job.js";
-import { refused } from "../shared/notices.js";
-import { AXIS, COLOURS, fitWidth } from "../shared/plots.js";
-import * as units from "../shared/units.js";
-import { worded } from "../shared/wording.js";
+import * as api from "../common/api.js";
+import { h } from "../common/dom.js";
+import { symbolOf } from "../common/formula.js";
+import { span } from "../common/intervals.js";
+import { jobs, queued } from "../common/job.js";
+import { refused } from "../common/notices.js";
+import { AXIS, COLOURS, fitWidth } from "../common/plots.js";
+import * as units from "../common/units.js";
+import { worded } from "../common/wording.js";
 
 const HEIGHT = 196;
 /** Points on each side at most, as the service has it. */

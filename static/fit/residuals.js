@@ -1,10 +1,10 @@
 // What the fit left: residuals by run and channel, how close to noise they are, and other minima.
 
+import { h } from "../common/dom.js";
+import { symbolOf } from "../common/formula.js";
+import { distinct, nameOf } from "../common/names.js";
+import * as units from "../common/units.js";
 import { short } from "../ride/comfort.js";
-import { h } from "../shared/dom.js";
-import { symbolOf } from "../shared/formula.js";
-import { distinct, nameOf } from "../shared/names.js";
-import * as units from "../shared/units.js";
 
 /** p below which residuals are not white beyond doubt, and the share of samples they must be worth. */
 const SURE = 1e-6;

@@ -1,15 +1,15 @@
 // What an identification found, and how far it is while it runs.
 
 import { isOfThisCar } from "../car/controls.js";
+import { DETERMINED, mark, WORDS } from "../common/determined.js";
+import { $, breakable, capital, counted, fileName, h, saveFile, symbol } from "../common/dom.js";
+import { span } from "../common/intervals.js";
+import { queued } from "../common/job.js";
+import { distinct, nameOf } from "../common/names.js";
+import { get } from "../common/store.js";
+import * as units from "../common/units.js";
+import { worded } from "../common/wording.js";
 import { percent, short } from "../ride/comfort.js";
-import { DETERMINED, mark, WORDS } from "../shared/determined.js";
-import { $, breakable, capital, counted, fileName, h, saveFile, symbol } from "../shared/dom.js";
-import { span } from "../shared/intervals.js";
-import { queued } from "../shared/job.js";
-import { distinct, nameOf } from "../shared/names.js";
-import { get } from "../shared/store.js";
-import * as units from "../shared/units.js";
-import { worded } from "../shared/wording.js";
 import { costChart } from "./cost.js";
 import * as sensors from "./sensors_form.js";
 import { combinations, summary } from "./verdict.js";

@@ -1,8 +1,8 @@
 // How a fit searches: from how many starts, and how much outliers count.
 
-import { fold, h } from "../shared/dom.js";
-import { get, set } from "../shared/store.js";
-import * as units from "../shared/units.js";
+import { fold, h } from "../common/dom.js";
+import { get, set } from "../common/store.js";
+import * as units from "../common/units.js";
 
 const LOSSES = {
   linear: "least squares", soft_l1: "soft L1", huber: "Huber", cauchy: "Cauchy", arctan: "arctan",

@@ -1,10 +1,10 @@
 // What is known of the sensors that recorded the runs, or is to be found with the parameters: by
 // channel its sign, gain, delay and bias, and whether the noise is fitted.
 
+import { fold, h } from "../common/dom.js";
+import { get, set } from "../common/store.js";
+import * as units from "../common/units.js";
 import { CORNERS } from "../ride/poses.js";
-import { fold, h } from "../shared/dom.js";
-import { get, set } from "../shared/store.js";
-import * as units from "../shared/units.js";
 
 const SHORT = { "chassis.z": "z", "chassis.pitch": "pitch", "chassis.roll": "roll", "chassis.a_x": "aₓ",
   ...Object.fromEntries(CORNERS.map((corner) => [`wheel.${corner}.z`, `wheel ${corner.toUpperCase()}`])) };

@@ -1,10 +1,10 @@
 // What an identification is told: how each run is used, and how recordings drive the model.
 
+import { breakable, h } from "../common/dom.js";
+import { dataOf, drivenBy, lacks, nameOf, ofAnotherCar, ofAnotherPlant, original } from "../common/names.js";
+import { get, set } from "../common/store.js";
 import * as noise from "../recordings/noise.js";
 import * as preparation from "../ride/preparation.js";
-import { breakable, h } from "../shared/dom.js";
-import { dataOf, drivenBy, lacks, nameOf, ofAnotherCar, ofAnotherPlant, original } from "../shared/names.js";
-import { get, set } from "../shared/store.js";
 import * as free from "./free.js";
 import * as search from "./search_form.js";
 

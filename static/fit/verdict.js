@@ -1,10 +1,10 @@
 // What the runs of a fit determine: in sentences, as combinations, and along which directions not.
 
-import { condition, mark, WORDS } from "../shared/determined.js";
-import { h } from "../shared/dom.js";
-import { combinationRow, formula, symbolOf } from "../shared/formula.js";
-import { share, span } from "../shared/intervals.js";
-import * as units from "../shared/units.js";
+import { condition, mark, WORDS } from "../common/determined.js";
+import { h } from "../common/dom.js";
+import { combinationRow, formula, symbolOf } from "../common/formula.js";
+import { share, span } from "../common/intervals.js";
+import * as units from "../common/units.js";
 
 /** Half-width from which a direction is shown, and of how many at most. */
 const WIDE = 0.15;

@@ -5,14 +5,14 @@
 
 import { damperNames } from "../car/car.js";
 import { withValues } from "../car/controls.js";
+import * as api from "../common/api.js";
+import { debounced } from "../common/dom.js";
+import { nameOf } from "../common/names.js";
+import { notice } from "../common/notices.js";
+import { get, on, set } from "../common/store.js";
+import * as units from "../common/units.js";
 import * as priors from "../fit/priors.js";
 import { USUAL } from "../fit/search_form.js";
-import * as api from "../shared/api.js";
-import { debounced } from "../shared/dom.js";
-import { nameOf } from "../shared/names.js";
-import { notice } from "../shared/notices.js";
-import { get, on, set } from "../shared/store.js";
-import * as units from "../shared/units.js";
 
 const SAVE_AFTER = 400;
 /** What the service has of a part that is on its way, or was when the connection went. */

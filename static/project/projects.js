@@ -1,10 +1,10 @@
 // The visitor's projects, each a session: which one is open, its name, and the way to the others.
 
+import * as api from "../common/api.js";
+import { $, counted, h, when } from "../common/dom.js";
+import { refused } from "../common/notices.js";
+import { get, on, set } from "../common/store.js";
 import * as measurements from "../recordings/measurements.js";
-import * as api from "../shared/api.js";
-import { $, counted, h, when } from "../shared/dom.js";
-import { refused } from "../shared/notices.js";
-import { get, on, set } from "../shared/store.js";
 import * as keeping from "./keeping.js";
 
 const LONGEST = 80;

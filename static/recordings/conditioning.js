@@ -1,10 +1,10 @@
 // What is done to a recording before it is used: steps, why they are suggested, and what they did.
 
-import * as api from "../shared/api.js";
-import { h, inPlace } from "../shared/dom.js";
-import { beforeAndAfter, legend } from "../shared/envelope.js";
-import { get, set } from "../shared/store.js";
-import * as units from "../shared/units.js";
+import * as api from "../common/api.js";
+import { h, inPlace } from "../common/dom.js";
+import { beforeAndAfter, legend } from "../common/envelope.js";
+import { get, set } from "../common/store.js";
+import * as units from "../common/units.js";
 import { KINDS, fieldsOf } from "./conditioning_fields.js";
 
 const SAMPLES = 1500;

@@ -1,7 +1,7 @@
 // The steps of conditioning as rows of fields: what each kind takes, in which unit, and what holds untold.
 
-import { h } from "../shared/dom.js";
-import * as units from "../shared/units.js";
+import { h } from "../common/dom.js";
+import * as units from "../common/units.js";
 
 const CORNERS = ["fl", "fr", "rl", "rr"];
 const BAND = (key, label, untold) => ({ key, label, form: "numbers", count: 2, unit: "Hz", untold });

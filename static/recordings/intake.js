@@ -1,10 +1,10 @@
 // The dialog in which a file becomes a run: its columns channels, its raw sensors what a fit needs.
 
+import * as api from "../common/api.js";
+import { $, breakable, h } from "../common/dom.js";
+import { nameOf } from "../common/names.js";
+import { get, set } from "../common/store.js";
 import { choose } from "../ride/ride.js";
-import * as api from "../shared/api.js";
-import { $, breakable, h } from "../shared/dom.js";
-import { nameOf } from "../shared/names.js";
-import { get, set } from "../shared/store.js";
 import * as conditioning from "./conditioning.js";
 import * as mapping from "./mapping.js";
 import { nextStage, stepper } from "./stages.js";

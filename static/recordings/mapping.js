@@ -1,8 +1,8 @@
 // Columns of a file as channels: what is guessed and why, corrected by a person, applied, kept.
 
-import * as api from "../shared/api.js";
-import { $, h, inPlace } from "../shared/dom.js";
-import * as units from "../shared/units.js";
+import * as api from "../common/api.js";
+import { $, h, inPlace } from "../common/dom.js";
+import * as units from "../common/units.js";
 import { clockOf, clocks } from "./mapping_clock.js";
 import * as detail from "./mapping_detail.js";
 import {

@@ -2,7 +2,7 @@
 //
 // `of` is {columns, entries, step} of a mapping on show.
 
-import * as units from "../shared/units.js";
+import * as units from "../common/units.js";
 
 /** Which clock the run will have, where the columns have several. */
 export function clocks(of) {

@@ -1,9 +1,9 @@
 // One column of a file close up: its numbers over time, what it may be and why.
 
-import * as api from "../shared/api.js";
-import { breakable, h } from "../shared/dom.js";
-import { envelope } from "../shared/envelope.js";
-import * as units from "../shared/units.js";
+import * as api from "../common/api.js";
+import { breakable, h } from "../common/dom.js";
+import { envelope } from "../common/envelope.js";
+import * as units from "../common/units.js";
 
 const POINTS = 600;
 /** How long a column is selected before it is read, ms. */

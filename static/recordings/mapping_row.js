@@ -1,8 +1,8 @@
 // One column of a file as a row of the table: what it is taken for, and the controls that change it.
 
-import { breakable, h } from "../shared/dom.js";
-import { get } from "../shared/store.js";
-import * as units from "../shared/units.js";
+import { breakable, h } from "../common/dom.js";
+import { get } from "../common/store.js";
+import * as units from "../common/units.js";
 import { USUAL_UNITS, offered } from "./mapping_entries.js";
 
 /**

@@ -1,7 +1,7 @@
 // Mappings kept by name, for the next files whose columns are the same.
 
-import * as api from "../shared/api.js";
-import { h } from "../shared/dom.js";
+import * as api from "../common/api.js";
+import { h } from "../common/dom.js";
 import { entriesOf } from "./mapping_entries.js";
 
 /**

@@ -1,16 +1,16 @@
 // Measured rides: add by button or by dropping files, with notes on their noise and with what was
 // driven; see how far each is on its way from file to run; look, delete.
 
+import * as api from "../common/api.js";
+import { $, breakable, capital, h, inPlace, when } from "../common/dom.js";
+import { Misplaced, RECORDINGS, kindOfJson, requireNotes } from "../common/file_kinds.js";
+import { dataOf, drivenBy, lacks, nameOf, original } from "../common/names.js";
+import { notice } from "../common/notices.js";
+import { AXIS, COLOURS, fitWidth } from "../common/plots.js";
+import { get, on, set } from "../common/store.js";
+import * as units from "../common/units.js";
 import { choose } from "../ride/ride.js";
 import { settled } from "../ride/simulation.js";
-import * as api from "../shared/api.js";
-import { $, breakable, capital, h, inPlace, when } from "../shared/dom.js";
-import { Misplaced, RECORDINGS, kindOfJson, requireNotes } from "../shared/file_kinds.js";
-import { dataOf, drivenBy, lacks, nameOf, original } from "../shared/names.js";
-import { notice } from "../shared/notices.js";
-import { AXIS, COLOURS, fitWidth } from "../shared/plots.js";
-import { get, on, set } from "../shared/store.js";
-import * as units from "../shared/units.js";
 import * as intake from "./intake.js";
 import { sentence } from "./noise.js";
 import { nextStage, stagesOf, stepper } from "./stages.js";

@@ -1,11 +1,11 @@
 // The noise of the compared channels, which weighs them against each other in a fit: typed for all
 // its runs, else as a run states it, else the service's default. A standard deviation.
 
-import { fold, h } from "../shared/dom.js";
-import { nameOf } from "../shared/names.js";
-import { notice } from "../shared/notices.js";
-import { get, set } from "../shared/store.js";
-import * as units from "../shared/units.js";
+import { fold, h } from "../common/dom.js";
+import { nameOf } from "../common/names.js";
+import { notice } from "../common/notices.js";
+import { get, set } from "../common/store.js";
+import * as units from "../common/units.js";
 
 const SHORT = { "chassis.z": "z", "chassis.pitch": "pitch", "chassis.roll": "roll" };
 const CHANNELS = Object.keys(SHORT);

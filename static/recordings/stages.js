@@ -1,7 +1,7 @@
 // From a file to a run: what has been done to a recording and what comes next.
 
-import { h } from "../shared/dom.js";
-import { lacks } from "../shared/names.js";
+import { h } from "../common/dom.js";
+import { lacks } from "../common/names.js";
 
 /**
  * The four stages of a recording: key, label, state and what is told of it.

@@ -4,9 +4,9 @@
 // simulations, which do not wait for it: half a second against some tens of ms.
 
 import { isOfThisCar } from "../car/controls.js";
-import * as api from "../shared/api.js";
-import { $, debounced, h } from "../shared/dom.js";
-import { get, on, set } from "../shared/store.js";
+import * as api from "../common/api.js";
+import { $, debounced, h } from "../common/dom.js";
+import { get, on, set } from "../common/store.js";
 import { request } from "./simulation.js";
 
 const REST = 350;

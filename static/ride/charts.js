@@ -1,10 +1,10 @@
 // Linked charts of the ride: measured, compared car and now, one time cursor for all and for 3D.
 
-import { $, debounced, h, tabs } from "../shared/dom.js";
-import { AXIS, COLOURS, decadeLabels, decades, room } from "../shared/plots.js";
-import { get, on } from "../shared/store.js";
-import * as units from "../shared/units.js";
-import { worded } from "../shared/wording.js";
+import { $, debounced, h, tabs } from "../common/dom.js";
+import { AXIS, COLOURS, decadeLabels, decades, room } from "../common/plots.js";
+import { get, on } from "../common/store.js";
+import * as units from "../common/units.js";
+import { worded } from "../common/wording.js";
 import { CORNERS, locate } from "./poses.js";
 import { density } from "./spectrum.js";
 import { clock, onTime, seek } from "./timeline.js";

@@ -1,13 +1,13 @@
 // Comfort and road holding in numbers: now against the car it is compared with.
 
-import * as api from "../shared/api.js";
-import { $, fileName, h, saveFile } from "../shared/dom.js";
-import { span } from "../shared/intervals.js";
-import { nameOf } from "../shared/names.js";
-import { refused } from "../shared/notices.js";
-import { get, on, set } from "../shared/store.js";
-import * as units from "../shared/units.js";
-import { worded } from "../shared/wording.js";
+import * as api from "../common/api.js";
+import { $, fileName, h, saveFile } from "../common/dom.js";
+import { span } from "../common/intervals.js";
+import { nameOf } from "../common/names.js";
+import { refused } from "../common/notices.js";
+import { get, on, set } from "../common/store.js";
+import * as units from "../common/units.js";
+import { worded } from "../common/wording.js";
 import { ofRide } from "./simulation.js";
 
 const SAME = 0.001;

@@ -1,9 +1,9 @@
 // How recordings drive the model: traction, initial state, filters, and when each run brakes.
 
-import { fold, h } from "../shared/dom.js";
-import { nameOf } from "../shared/names.js";
-import { get, set } from "../shared/store.js";
-import * as units from "../shared/units.js";
+import { fold, h } from "../common/dom.js";
+import { nameOf } from "../common/names.js";
+import { get, set } from "../common/store.js";
+import * as units from "../common/units.js";
 
 /** Hz, as the service takes them. */
 const LOW_PASS = { min: "0.5" };

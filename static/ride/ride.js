@@ -1,8 +1,8 @@
 // Which ride is simulated: a measured one (the rims' motion prescribed) or a manoeuvre on a road.
 
-import { $, h } from "../shared/dom.js";
-import { nameOf } from "../shared/names.js";
-import { get, on, set } from "../shared/store.js";
+import { $, h } from "../common/dom.js";
+import { nameOf } from "../common/names.js";
+import { get, on, set } from "../common/store.js";
 
 /** Where a single bump or hole lies, m ahead of the standing car's CG. */
 const SHAPE_AT = 20;

@@ -1,10 +1,10 @@
 // The 3D view: viser in a frame of our own origin, posed through its bridge (bridge.js).
 
-import { brokenOff } from "../shared/connection.js";
-import { $, capital, h } from "../shared/dom.js";
-import { COLOURS } from "../shared/plots.js";
-import { get, on, set } from "../shared/store.js";
-import * as units from "../shared/units.js";
+import { brokenOff } from "../common/connection.js";
+import { $, capital, h } from "../common/dom.js";
+import { COLOURS } from "../common/plots.js";
+import { get, on, set } from "../common/store.js";
+import * as units from "../common/units.js";
 import { carMessages, farPivots, ghostMessages, pivotAt, update, visibility } from "./poses.js";
 import { surface } from "./road.js";
 import { clock, onTime } from "./timeline.js";

@@ -4,8 +4,8 @@
 // service takes the newest (stream.js): what it simulates is what the slider says by then.
 
 import { withValues } from "../car/controls.js";
-import * as api from "../shared/api.js";
-import { get, set } from "../shared/store.js";
+import * as api from "../common/api.js";
+import { get, set } from "../common/store.js";
 import { allChannels, visibleChannels } from "./charts.js";
 import { POSE_CHANNELS } from "./poses.js";
 import { rimsOf } from "./preparation.js";

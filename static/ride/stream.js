@@ -1,7 +1,7 @@
 // Simulations of a slider that is being moved, over a websocket: of the requests that wait for
 // their turn the service runs the newest alone. Where there is no websocket, each is sent by itself.
 
-import * as api from "../shared/api.js";
+import * as api from "../common/api.js";
 
 /** Milliseconds after which a websocket is tried again that could not be had. */
 const AGAIN = 30_000;

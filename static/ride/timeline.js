@@ -1,7 +1,7 @@
 // The time of the ride: one clock for 3D, charts and the slider under the view.
 
-import { $, h } from "../shared/dom.js";
-import * as units from "../shared/units.js";
+import { $, h } from "../common/dom.js";
+import * as units from "../common/units.js";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
 const listeners = [];

@@ -1,7 +1,7 @@
 // One figure of a validation: a titled plot of lines over time or frequency, with its legend.
 
-import { h } from "../shared/dom.js";
-import { AXIS, COLOURS, decadeLabels, decades, fitWidth, room } from "../shared/plots.js";
+import { h } from "../common/dom.js";
+import { AXIS, COLOURS, decadeLabels, decades, fitWidth, room } from "../common/plots.js";
 
 const HEIGHT = 140;
 const LOG_HEIGHT = 240;

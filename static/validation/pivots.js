@@ -1,8 +1,8 @@
 // Where the pivots lie by drawing or bench, typed to be held against where a fit puts them.
 
-import { h } from "../shared/dom.js";
-import { symbolOf } from "../shared/formula.js";
-import * as units from "../shared/units.js";
+import { h } from "../common/dom.js";
+import { symbolOf } from "../common/formula.js";
+import * as units from "../common/units.js";
 
 const AXLES = { front: "Front", rear: "Rear" };
 const NUMBERS = ["distance", "angle"];

@@ -1,7 +1,7 @@
 // The report: one file that holds its data, these modules and their styles, and needs no network.
 
-import { $, h } from "../shared/dom.js";
-import * as units from "../shared/units.js";
+import { $, h } from "../common/dom.js";
+import * as units from "../common/units.js";
 import { sections } from "./validation_view.js";
 
 /** Width of a figure, px: that of an A4 page between its margins. */

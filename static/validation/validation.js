@@ -1,15 +1,15 @@
 // Validation: let the fitted car predict its runs and others, follow the job, show what it found.
 
+import * as api from "../common/api.js";
+import { $, h, inPlace } from "../common/dom.js";
+import { jobs, queued } from "../common/job.js";
+import { nameOf, ofAnotherCar } from "../common/names.js";
+import { refused } from "../common/notices.js";
+import { get, on } from "../common/store.js";
+import { worded } from "../common/wording.js";
 import { heldOut, unseen } from "../fit/setup.js";
 import { stagesOf } from "../recordings/stages.js";
 import { brakingOf } from "../ride/preparation.js";
-import * as api from "../shared/api.js";
-import { $, h, inPlace } from "../shared/dom.js";
-import { jobs, queued } from "../shared/job.js";
-import { nameOf, ofAnotherCar } from "../shared/names.js";
-import { refused } from "../shared/notices.js";
-import { get, on } from "../shared/store.js";
-import { worded } from "../shared/wording.js";
 import * as pivots from "./pivots.js";
 import { sections } from "./validation_view.js";
 

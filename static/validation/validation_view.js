@@ -1,10 +1,10 @@
 // A validation as the page and the report show it: tables and the figures of the paper, redrawn.
 
-import { h, symbol } from "../shared/dom.js";
-import { span } from "../shared/intervals.js";
-import { COLOURS } from "../shared/plots.js";
-import * as units from "../shared/units.js";
-import { worded } from "../shared/wording.js";
+import { h, symbol } from "../common/dom.js";
+import { span } from "../common/intervals.js";
+import { COLOURS } from "../common/plots.js";
+import * as units from "../common/units.js";
+import { worded } from "../common/wording.js";
 import { figure } from "./figure.js";
 
 const OUTPUTS = ["chassis.z", "chassis.pitch", "chassis.roll"];

@@ -11,7 +11,7 @@ STIFFNESS = "front.suspension.stiffness"
 def add_message(visitor, title, kind="info"):
     visitor.page.evaluate(
         """async ([kind, title]) => {
-            const { notice } = await import("/static/shared/notices.js");
+            const { notice } = await import("/static/common/notices.js");
             notice(kind, title, "More. ".repeat(12));
         }""",
         [kind, title],
@@ -219,7 +219,7 @@ def test_runs_have_one_colour_everywhere(visitor):
     )
     lines = visitor.page.evaluate(
         """async () => {
-            const { COLOURS } = await import("/static/shared/plots.js");
+            const { COLOURS } = await import("/static/common/plots.js");
             const box = document.createElement("i");
             return ["measured", "reference", "now"].map((run) => {
                 box.style.color = COLOURS[run];

@@ -201,7 +201,7 @@ def test_sentences_of_the_service_are_said_in_the_pages_words(visitor, said, sho
     """Oracle: unit conversion by hand; 1 rad is 57.296 deg."""
     text = in_module(
         visitor,
-        "shared/wording",
+        "common/wording",
         """return m.worded(a[0]).map((part) => part.textContent ?? part).join("");""",
         said,
     )
@@ -216,7 +216,7 @@ def test_sentences_of_the_service_are_said_in_the_pages_words(visitor, said, sho
     ],
 )
 def test_a_logarithmic_axis_has_few_lines_at_powers_of_ten(visitor, low, high, lines):
-    found = in_module(visitor, "shared/plots", "return m.decades(a[0], a[1]);", low, high)
+    found = in_module(visitor, "common/plots", "return m.decades(a[0], a[1]);", low, high)
     assert found == pytest.approx(lines)
 
 
@@ -231,7 +231,7 @@ def test_a_logarithmic_axis_has_few_lines_at_powers_of_ten(visitor, low, high, l
 )
 def test_an_end_that_stands_alone_is_not_rounded_beyond_its_value(visitor, interval, shown):
     """A value of 13.96 at its bound is not "from 14.0"."""
-    assert in_module(visitor, "shared/intervals", "return m.span(a[0], 1);", interval) == shown
+    assert in_module(visitor, "common/intervals", "return m.span(a[0], 1);", interval) == shown
 
 
 BAR, RATIO = "rear.stabilizer_bar.stiffness", "front.suspension.rebound_ratio"
@@ -254,7 +254,7 @@ def test_what_a_bound_decides_is_not_marked_as_what_runs_determine(visitor, held
             m.mark({ name, determined }, { verdict: a[0], parameters: [{ name: a[1] }] }));
         return marked.map(({ innerText, className, title }) => [innerText, className, title]);"""
     well, other, not_at_all = in_module(
-        visitor, "shared/determined", body, {"conditions": held}, BAR
+        visitor, "common/determined", body, {"conditions": held}, BAR
     )
     assert other == ["well", "determined yes", "well determined"]
     assert not_at_all == ["not", "determined no", "not determined"]
@@ -270,7 +270,7 @@ def test_a_view_that_fails_is_reported_and_nobody_else_s_affair(visitor):
     visitor.expect("the view's own mistake")
     seen = in_module(
         visitor,
-        "shared/store",
+        "common/store",
         """const seen = [];
         m.on("ofTheTest", () => { throw new Error("the view's own mistake"); });
         m.on("ofTheTest", () => seen.push(m.get("ofTheTest")));

@@ -32,7 +32,7 @@ def assert_shown_is_simulated_with_the_sliders(visitor):
     """Oracle: the same car by a request of its own."""
     shown, posted = visitor.page.evaluate(
         """async () => {
-            const api = await import("/static/shared/api.js");
+            const api = await import("/static/common/api.js");
             const { request } = await import("/static/ride/simulation.js");
             const state = window.ridetune.state;
             const car = { vehicle: state("vehicle"), values: state("values") };
