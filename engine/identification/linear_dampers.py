@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from ..frames import AXLES
 from ..parameters import RATIO_BOUNDS
 from .residuals import Residuals
-from .search import RELEASED, Found
-from .uncertainty import DIRECTION_TOLERANCE
+from .search import RELEASED, Found, gauss_newton
 from .variables import FreeParameter
 
 Array = NDArray[np.float64]
@@ -28,7 +27,7 @@ def freed_ratios(residuals: Residuals, found: Found, held: NDArray[np.bool_]) ->
 
     held : what is at a bound, of all that the fit looked for, and stays there
     """
-    problem, n = residuals.problem, len(found.x)
+    problem, of_car = residuals.problem, len(residuals.problem.free)
     names = [f"{axle}.suspension.rebound_ratio" for axle in AXLES]
     free = {one.name for one in problem.free}
     kept = [
@@ -40,16 +39,12 @@ def freed_ratios(residuals: Residuals, found: Found, held: NDArray[np.bool_]) ->
         return {}
     ratios = tuple(FreeParameter(name, LINEAR, *RATIO_BOUNDS) for name in kept)
     wider = residuals.of(replace(problem, free=(*problem.free, *ratios)))
-    of_car = len(problem.free)
     x = np.insert(found.x, of_car, [one.variable(LINEAR) for one in ratios])
     rows, root = wider.reweighted(x, found.residuals)
     jacobian = wider.reweighted_slopes(wider.jacobian(x), root)
-    places = range(of_car, of_car + len(kept))
-    others = np.delete(np.arange(n + len(kept)), places)[~held]
+    moved = np.insert(~held, of_car, [False] * len(kept))
     steps = {}
-    for name, place in zip(kept, places, strict=True):
-        moved = [*others, place]
-        step = np.zeros(n + len(kept))
-        step[moved] = -np.linalg.lstsq(jacobian[:, moved], rows, rcond=DIRECTION_TOLERANCE)[0]
+    for place, name in enumerate(kept, start=of_car):
+        step = gauss_newton(jacobian, rows, moved | (np.arange(len(x)) == place))
         steps[name] = step[:of_car] * RELEASED / max(abs(step[place]), RELEASED)
     return steps

@@ -113,11 +113,7 @@ class Found:
         return found
 
     def _step(self, free: NDArray[np.bool_]) -> Array:
-        """The Gauss-Newton step of some variables; the others stay."""
-        step = np.zeros_like(self.x)
-        columns = self.jacobian[:, free]
-        step[free] = -np.linalg.lstsq(columns, self.rows, rcond=DIRECTION_TOLERANCE)[0]
-        return step
+        return gauss_newton(self.jacobian, self.rows, free)
 
     def holds(self, x: Array, cost: float, gradient: Array) -> bool:
         """Whether x lies where the quadratic about this minimum is the cost: its basin.
@@ -132,6 +128,13 @@ class Found:
             return False
         missed = away - np.linalg.pinv(self.curvature, hermitian=True) @ gradient
         return float(missed @ self.curvature @ missed) <= max(2.0 * QUADRATIC**2 * rise, some)
+
+
+def gauss_newton(jacobian: Array, rows: Array, free: NDArray[np.bool_]) -> Array:
+    """The step (n,) of some variables towards the least squares of rows; the others stay."""
+    step = np.zeros(jacobian.shape[1])
+    step[free] = -np.linalg.lstsq(jacobian[:, free], rows, rcond=DIRECTION_TOLERANCE)[0]
+    return step
 
 
 def _cost_alone(z: Array) -> Array:
