@@ -99,5 +99,5 @@ export function jobs(kind, what, { changed, progressed = changed, ended }) {
 
   setInterval(explain, LOOK);
   on("online", ({ online }) => { if (online && busy()) watch(); });
-  return { now: () => job, busy, start, resume, cancel };
+  return { now: () => job, busy, sending: () => starting, start, resume, cancel };
 }

@@ -19,11 +19,9 @@ import * as setup from "./setup.js";
 
 let holdouts = {};
 let view = "setup";
-/** Whether a fit is being asked for. */
-let sending = false;
 let hooks = {};
-const { now: current, busy, start: send, resume: takeUp, cancel } = jobs("identifications", "identification",
-  { changed: show, progressed: advance, ended });
+const { now: current, busy, sending, start: send, resume: takeUp, cancel } =
+  jobs("identifications", "identification", { changed: show, progressed: advance, ended });
 
 export { current };
 
@@ -96,11 +94,10 @@ async function request() {
 
 async function start() {
   if (![ready, search.ready, priors.ready, sensors.ready].every((one) => one())) return;
-  sending = true;
+  const taken = send(request);
   press();
-  const taken = await send(request);
-  sending = false;
-  if (taken) view = "fit";
+  if (!await taken) return;
+  view = "fit";
   show();
 }
 
@@ -170,7 +167,7 @@ function show() {
 
 /** The buttons that begin a fit, while one is sent or under way. */
 function press() {
-  const waits = sending || busy();
+  const waits = sending() || busy();
   for (const button of [$("#identify"), $("#start")].filter(Boolean)) {
     Object.assign(button, { disabled: waits, textContent: waits ? "Identifying …" : "Identify" });
   }
